@@ -1,6 +1,8 @@
 """Tables in CSV, NPZ and Parquet."""
 
+import os
 import sys
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -162,10 +164,89 @@ def test_formats_of_positions_refuse_derivatives_alone(run, fails):
     run("sample curve.npz -n 3 --nu 0,1 -o b.geojson")
 
 
-def test_comments_above_the_names_of_columns(fails):
-    write("a.csv", "# a comment\nt,x\n0,1\n1,2\n")
+def test_comments(run, fails):
+    expected = ss.CubicSpline([0, 1, 3], [[1], [2], [0]], "r:1")
+    for text in (
+        "# a comment, with a comma\nt,x\n0,1\n1,2\n3,0\n",
+        "# about\n#t, x [m]\n0,1\n# below\n\n1,2\n3,0\n",
+        "t x\n0 1\n1   2\n 3 0\n",
+        "# t x\n0 1\n1 2\n3 0\n",
+    ):
+        write("a.csv", text)
+        run("fit a.csv --space r:1 -o a.npz")
+        assert ss.load("a.npz") == expected
+    write("a.csv", "# about\nt,x\n0,1\n# below\n1,no\n3,0\n")
+    assert "a.csv, line 5: column 'x' holds 'no'" in fails("fit a.csv --space r:1 -o a.npz")
+    write("a.csv", "about this file\nt,x\n0,1\n1,2\n")
     problem = fails("fit a.csv --space r:1 -o a.npz")
     assert problem.endswith("but the first line names 1 column; remove lines above the names, such as comments")
+
+
+def test_text_in_utf_16(run):
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o a.npz")
+    for encoding in ("utf-16", "utf-16-be"):
+        mark = "\ufeff" if encoding.endswith("be") else ""
+        Path("b.csv").write_text(mark + TRACK.replace(",", "\t"), encoding=encoding)
+        run("fit b.csv --lonlat -o b.npz")
+        assert ss.load("b.npz") == ss.load("a.npz")
+
+
+def test_json_lines(run, fails):
+    write("a.csv", TRACK)
+    run("fit a.csv --lonlat -o a.npz")
+    run("sample a.npz --every 6h -o b.jsonl")
+    assert Path("b.jsonl").read_text(encoding="utf-8").count("\n") == 4
+    for line in ("b.jsonl", "b.json"):
+        Path("b.json").write_bytes(Path("b.jsonl").read_bytes())
+        run(f"fit {line} --lonlat -o b.npz")
+        np.testing.assert_allclose(ss.load("b.npz").points, ss.load("a.npz").points, atol=1e-15)
+    write("c.jsonl", '{"t": 0, "x": 1}\n{"t": 1, "x": \n')
+    assert fails("fit c.jsonl --space r:1 -o c.npz").startswith("c.jsonl, line 2 is not JSON: Expecting value")
+
+
+def test_arrays_of_numpy(run, fails):
+    np.save("a.npy", np.eye(3))
+    run("fit a.npy --space s:2 -o a.npz")
+    assert ss.load("a.npz") == ss.CubicSpline(None, np.eye(3), "s:2")
+    run("sample a.npz -n 5 -o b.npy")
+    run("fit b.npy --space s:2 -o b.npz")
+    np.testing.assert_allclose(ss.load("b.npz").points, ss.load("a.npz")(np.linspace(0, 2, 5)), atol=1e-15)
+    np.save("c.npy", np.array([{}]))
+    assert "c.npy is damaged, or not an array of numbers" in fails("fit c.npy --space s:2 -o c.npz")
+
+
+def test_further_missing_values(run, fails):
+    write("a.csv", "t,id,x\n0,a,1\n1,a,-999\n2,none,5\n3,a,2\n4,a,n/a\n")
+    assert "line 6: column 'x' holds 'n/a'" in fails("fit a.csv --space r:1 --columns x -o a.npz")
+    options = "--space r:1 --columns x --curve id --na -999.0,n/a,none"
+    assert "line 3: column 'x' is empty or NaN; symspline fit --skipna" in fails(f"fit a.csv {options} -o a.npz")
+    run(f"fit a.csv {options} --skipna -o a.npz")
+    assert ss.load("a.npz")["a"] == ss.CubicSpline([0, 3], [[1], [2]], "r:1")
+    np.savez("b.npz", t=[0, 1, 3], x=[1, -999, 2])
+    run("fit b.npz --space r:1 --na=-999 --skipna -o c.npz")
+    assert ss.load("c.npz") == ss.load("a.npz")["a"]
+
+
+def test_points_and_commas_in_one_table_raise(fails, run):
+    write("a.csv", "t;x;y\n0;1,5;2\n1;2.5;3\n")
+    says = "a.csv: column 'x' has decimal points and decimal commas, 2.5 and 1,5; use one of them"
+    assert fails("fit a.csv --space r:2 -o a.npz") == says
+    write("a.csv", "t;x;y\n0;1,5;2.5\n1;2;3\n")
+    says = "a.csv: numbers have decimal points in column 'y', and decimal commas in column 'x'; use one of them"
+    assert fails("fit a.csv --space r:2 -o a.npz") == says
+    write("a.csv", "t;x;y\n0;1,5;2\n1;2;3\n")
+    run("fit a.csv --space r:2 -o a.npz")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="named pipes are those of POSIX")
+def test_pipes_without_an_ending_are_csv(run):
+    os.mkfifo("pipe")
+    writer = threading.Thread(target=write, args=("pipe", TRACK))
+    writer.start()
+    run("fit pipe --lonlat -o a.npz")
+    writer.join()
+    assert len(ss.load("a.npz").t) == 4
 
 
 def test_one_curve_has_no_name(run, fails):

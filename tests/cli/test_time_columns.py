@@ -41,7 +41,7 @@ def test_dates_under_a_usual_name_are_the_time(run, times):
     for name in [*names, "utc"]:
         assert times("", **{name: DATES}) == HOURS.astype("M8[s]").tolist()
         run("sample a.npz --every 6h -o b.csv")
-        assert list(table("b.csv")) == [name, "x"]
+        assert list(table("b.csv")) == [name.removeprefix("#"), "x"]
     # A date with the time of day needs no other columns.
     assert times(ISO_TIME=DATES, year=[2021] * 3, hour=[0, 6, 18]) == HOURS.astype("M8[s]").tolist()
 
@@ -107,3 +107,43 @@ def test_rounded_times_name_the_option(run):
     t = 1.4e9 + np.arange(30) * 1e-3
     write("a.csv", "t,x\n" + "".join(f"{own!r},{i * i}\n" for i, own in enumerate(t.tolist())))
     assert "give the unit, such as --unix s" in run("fit a.csv --space r:1 -o a.npz", notes=True)
+
+
+@pytest.mark.parametrize(
+    "dates, options, zone",
+    [
+        (["2021-08-29 16:55:00 UTC", "2021-08-29 17:05:30.5 UTC"], "", "Z"),
+        (['"Sun, 29 Aug 2021 16:55:00 GMT"', '"Sun, 29 Aug 2021 17:05:30 GMT"'], "", "Z"),
+        (['"Sun, 29 Aug 2021 18:55:00 +0200"', '"Sun, 29 Aug 2021 19:05:30 +0200"'], "", "Z"),
+        (["29.08.2021 16:55:00", "29.08.2021 17:05:30"], "--time-format '%d.%m.%Y %H:%M:%S'", ""),
+        (["8/29/21 06:55:00 PM +0200", "8/29/21 07:05:30 PM +0200"], "--time-format '%m/%d/%y %I:%M:%S %p %z'", "Z"),
+        (["20210829165500", "20210829170530"], "--time-format %Y%m%d%H%M%S", ""),
+    ],
+)
+def test_dates_of_other_programs(run, dates, options, zone):
+    write("a.csv", "time,x\n" + "".join(f"{date},{i}\n" for i, date in enumerate(dates)))
+    run(f"fit a.csv --space r:1 {options} -o a.npz")
+    run("sample a.npz -n 2 -o b.csv")
+    first, last = table("b.csv")["time"]
+    assert first.removesuffix("Z").removesuffix(".000") == "2021-08-29T16:55:00" and last[:19] == "2021-08-29T17:05:30"
+    assert first.endswith("Z") == bool(zone)
+
+
+def test_dates_that_do_not_match_a_format(fails):
+    write("a.csv", "time,x\n29.08.2021,0\n2021-08-30,1\n")
+    assert "such as --time-format '%d.%m.%Y %H:%M'" in fails("fit a.csv --space r:1 -o a.npz")
+    problem = fails("fit a.csv --space r:1 --time-format %d.%m.%Y -o a.npz")
+    assert problem == "a.csv, line 3: column 'time' holds '2021-08-30', which does not match --time-format %d.%m.%Y"
+
+
+@pytest.mark.parametrize("names", ["date,time", "Time,Date", "day,clock"])
+def test_a_date_and_a_time_of_day(run, fails, names):
+    cells = {"date": "2021-08-29", "Date": "2021-08-29", "day": "2021-08-29"}
+    rows = [",".join([cells.get(name, clock) for name in names.split(",")]) for clock in ("16:55:00", "17:05:30")]
+    write("a.csv", f"{names},x\n" + "".join(f"{row},{i}\n" for i, row in enumerate(rows)))
+    first, last = sorted(names.split(","), key=lambda name: name not in cells)
+    if names != "day,clock":
+        problem = f"say --time {first},{last}, which joins a date and a time of day"
+        assert problem in fails("fit a.csv --space r:1 -o a.npz")
+    run(f"fit a.csv --space r:1 --time {first},{last} -o a.npz")
+    assert [str(t) for t in ss.load("a.npz").t] == ["2021-08-29T16:55:00", "2021-08-29T17:05:30"]

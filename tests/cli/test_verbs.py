@@ -118,7 +118,8 @@ def test_invalid_usage_fails(curves, fails):
     assert "not allowed with" in fails("sample a.npz -n 3 --every 1 -o b.csv")
     assert "--nu: 0,3: give one or more of 0, 1 and 2" in fails("sample a.npz -n 3 --nu 0,3 -o b.csv")
     assert fails("fit a.csv --space s:2 -o b.csv") == "b.csv: the name of a file of curves must end in .npz"
-    ending = "b.xls: the name of a table must end in .csv, .tsv, .npz, .parquet, .json, .geojson, .gpx, .tum or .txt"
+    names = ".csv, .tsv, .npz, .parquet, .npy, .json, .jsonl, .ndjson, .geojson, .gpx, .tum or .txt"
+    ending = f"b.xls: the name of a table must end in {names}"
     assert fails("sample a.npz -n 3 -o b.xls") == ending
     assert fails("plot a.npz -o b.txt").startswith("b.txt: the name of a picture must end in .")
     assert "must end in .csv" in fails("fit a.xls --space s:2 -o b.npz")

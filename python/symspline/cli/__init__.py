@@ -135,7 +135,8 @@ class _Parser(argparse.ArgumentParser):
         end = [*args, "--"].index("--")
         joined: list[str] = []
         for argument in args[:end]:
-            if joined and joined[-1] in words and argument in words[joined[-1]][0]:
+            # Missing values may begin with a minus.
+            if joined and (joined[-1] == "--na" or (joined[-1] in words and argument in words[joined[-1]][0])):
                 joined[-1] += f"={argument}"
             else:
                 joined.append(argument)

@@ -110,6 +110,7 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None], u
     doubtful = [name for name in parts if name not in certain]
     # A column of dates with their time of day needs no other columns.
     whole = len(certain) == 1 and certain[0] not in table.numeric and "time" in certain[0].lower()
+    whole = whole and not _is_time_of_day(table.cells(certain[0], 1))
     if whole or (len(certain) == 1 and not doubtful):
         return certain[0]
     likely = [*certain, *doubtful] or [name for name in table.dates if name in left]
@@ -119,10 +120,17 @@ def time_column(table: Table, given: str | None, others: Sequence[str | None], u
     meant, unit = likely[0], ", with --unix if it counts from 1970" if likely[0] in table.numeric else ""
     if len(likely) == 2 and re.search("n(ano)?secs?$", _letters(likely[1])):
         meant, unit = ",".join(likely), ", which adds seconds and nanoseconds since 1970"
+    if len(likely) == 2 and {*likely} <= {*table.dates} and any(map(_is_time_of_day, map(table.cells, likely, [1, 1]))):
+        likely.sort(key=lambda name: _is_time_of_day(table.cells(name, 1)))
+        meant, unit = ",".join(likely), ", which joins a date and a time of day"
     raise Problem(
         f"{table.path}: {listed(likely)} may {what}; say --time {quote(meant)}{unit}, or --time {NUMBERED} to number "
         "the points 0, 1, 2, ..."
     )
+
+
+def _is_time_of_day(cells: Sequence[str]) -> bool:
+    return bool(cells) and re.match(r"\d{1,2}:\d\d", cells[0]) is not None
 
 
 def _letters(name: str) -> str:
@@ -138,6 +146,8 @@ def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, s
     if given is None or len(names) != 2:
         return table, given
     table = table.without_empty([*map(table.require, names)]) if skipna else table
+    if any(name in table.dates and _DIGITS.search(table.cells(name, 1)[0]) for name in names):
+        return _with_joined(table, names)
     stamps = table.read([*map(table.require, names)], None, None).numbers
     wrong = np.flatnonzero((stamps != np.floor(stamps)).any(axis=1) | (np.abs(stamps) > _FARTHEST).any(axis=1))
     if wrong.size:
@@ -149,6 +159,19 @@ def with_stamps(table: Table, given: str | None, skipna: bool) -> tuple[Table, s
     time = given if "time" in columns else "time"
     columns[time] = (10**9 * seconds + rest).astype("datetime64[ns]")
     return replace(table, columns=columns, is_utc={**table.is_utc, time: True}), time
+
+
+_DIGITS = re.compile(r"\d\D\d")
+"""Matches dates and times of day, but not numbers of seconds."""
+
+
+def _with_joined(table: Table, names: list[str]) -> tuple[Table, str]:
+    """Return the table with one column for a date and a time of day, and its name."""
+    days, clocks = map(table.labels, names)
+    columns = {name: column for name, column in table.columns.items() if name not in names}
+    time = ",".join(names) if "time" in columns else "time"
+    columns[time] = np.array([f"{day} {clock}" for day, clock in zip(days, clocks, strict=True)], object)
+    return replace(table, columns=columns), time
 
 
 def check_days(table: Table, name: str | None, rows: Rows) -> None:

@@ -1,9 +1,9 @@
 """Fit C² splines to the points in a table, through them or, with --smooth, near them
 
-A table is a CSV, NPZ, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --from selects
+A table is a CSV, NPZ, NPY, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --from selects
 the format. Every row is a point at a time. Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or
-2021-08-29T16:55:00.5+02:00, all with a time zone or all without. Dates with Z or an offset are converted to UTC, and
-rates are per second.
+2021-08-29T16:55:00.5+02:00, or dates such as Sun, 29 Aug 2021 16:55:00 GMT, all with a time zone or all without. Dates
+with Z, UTC or an offset are converted to UTC, and rates are per second. --time-format reads other dates.
 
 The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix row
 by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
@@ -17,8 +17,8 @@ datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix
 "Date (UTC)". The command asks if another column seems to hold times. Without any, times are 0, 1, 2, ... Numbers in
 the column of times have no unit; with --unix ns they are nanoseconds since 1970, and become dates in UTC.
 
-CSV files, which pandas reads, name the columns in their first line; blank lines are skipped. Cells are separated by
-commas, semicolons or tabs, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays
+CSV files, which pandas reads, name the columns in their first line; blank lines and comments after # are skipped. Cells
+are separated by commas, semicolons, tabs or blanks, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays
 with one entry per row, which may be complex, or vectors or matrices; an array `points` may hold all numbers of the
 points. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw, on so:3 x r:3. GPX and
 GeoJSON files imply --lonlat, and each of their tracks, segments and lines is a curve of its own, whose name is in the
@@ -148,9 +148,10 @@ _CURVE = (
     "curve of all)"
 )
 _TIME = (
-    "column of times, none for 0, 1, 2, ..., or two columns with a comma, whole seconds and nanoseconds since 1970; "
-    "see above for the default"
+    "column of times, none for 0, 1, 2, ..., or two columns with a comma: whole seconds and nanoseconds since 1970, or "
+    "a date and a time of day; see above for the default"
 )
+_TIME_FORMAT = "format of dates that are not in ISO 8601, such as '%%d.%%m.%%Y %%H:%%M', as for strptime; %%z is a zone"
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 # Options of the library for curves through points and for curves near them.
 _THROUGH = {"bc_type": "--bc-type", "method": "--method", "tol": "--tol"}
@@ -166,6 +167,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--space", metavar="S", help="such as sphere:2, so:3, spd:3, cp:1 or 'so:3 x r:3'")
     add("--time", metavar="COL", help=_TIME)
     add("--unix", choices=UNITS, help="times are numbers that count this unit since 1970-01-01 in UTC")
+    add("--time-format", metavar="F", help=_TIME_FORMAT)
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
     add("--curve", metavar="COL", help=_CURVE)
     add("--lonlat", action="store_true", help="points are longitude and latitude in degrees, and perhaps a height")
@@ -173,6 +175,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
     add("--skipna", action="store_true", help="omit rows without a point or a time: empty cells, NaN, NA or null")
+    add("--na", type=split_names, metavar="W,...", help="further texts or numbers of missing values, such as -999")
     add("--dedup", choices=("first", "mean"), help="keep the first of the points of one time, or their mean")
     add("--max-gap", metavar="DT", help=_MAX_GAP)
     add("--bc-type", type=_ends, metavar="END", help=_ENDS)
@@ -220,7 +223,8 @@ def run(options: argparse.Namespace) -> int:
     check_target(options.output, options.input, binary=True)
     if options.space is not None:
         space_named(options.space)
-    table = open_table(options.input, options.format)
+    table = replace(open_table(options.input, options.format), time_format=options.time_format)
+    table = table if options.na is None else table.without_values(options.na)
     space = _space(options, table)
     keywords = _keywords(options, space)
     data, columns = _read(options, table, space)
@@ -328,7 +332,7 @@ def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Reco
         options.curve = None
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
-    time = time_column(table, time, [curve, *given], options.unix is not None)
+    time = time_column(table, time, [curve, *given], options.unix is not None or options.time_format)
     points = point_columns(table, given, [time, curve], space, options.lonlat, options.quaternion)
     points = replace(points, degrees=options.degrees)
     needed = [*points.used, *filter(None, [time, curve])]

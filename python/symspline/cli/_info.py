@@ -77,7 +77,7 @@ def _installation() -> list[str]:
     spaces = [(example_of(cls).rpartition("'")[0].rpartition("'")[2], cls) for cls in CLASSES.values()]
     lines = ["spaces, such as:"]
     lines += [f"  {name}: {(cls.__doc__ or '').partition(chr(10))[0]}" for name, cls in spaces]
-    lines += [f"formats of tables: {endings()}", "optional libraries:"]
+    lines += ["formats of tables:", f"  {endings()}", "optional libraries:"]
     return lines + [
         f"  {name}: {'installed' if find_spec(name) else 'missing'}, {use}" for name, use in _LIBRARIES.items()
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import io
 import os
@@ -206,7 +207,20 @@ class Source:
                     unpacked = io.BytesIO(gzip.decompress(file.read())) if packed else file
                 except (EOFError, zlib.error, gzip.BadGzipFile):
                     raise Problem(f"{self} is damaged: it cannot be decompressed") from None
-                yield unpacked
+                yield _in_utf8(unpacked)
+
+
+def _in_utf8(file: BinaryIO) -> BinaryIO:
+    """Return text in UTF-16, as spreadsheets export it, in UTF-8, and other files as they are."""
+    start = file.read(2)
+    file.seek(0)
+    if start not in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+        return file
+    try:
+        return io.BytesIO(file.read().decode("utf-16").encode())
+    except UnicodeDecodeError:
+        file.seek(0)
+        return file
 
 
 @cache

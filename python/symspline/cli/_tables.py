@@ -9,11 +9,12 @@ import math
 import re
 import warnings
 import zipfile
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from datetime import UTC
 from decimal import Decimal, InvalidOperation
+from email.utils import parsedate_to_datetime
 from importlib import import_module
 from itertools import chain, count, islice
 from pathlib import Path, PurePath
@@ -60,10 +61,12 @@ FIRST = 50
 # 2021-08-29, 29.8.2021, 8/29/21, 20210829T1655, 16:55, 29 Aug 2021, Aug 29, 2021
 _MONTH = r"(?:jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec)[a-z]*"
 _DATE_LIKE = re.compile(
-    r"\d{4}([-/.])\d{1,2}\1\d{1,2}(?!\d)|\d{1,2}([-/.])\d{1,2}\2(?:\d{4}|\d{2})(?!\d|\.\d)|\d{8}T\d{4}|\d{1,2}:\d{2}(?!\d)"
-    rf"|\d{{1,2}}[-. ]*{_MONTH}[-. ,]*\d{{2}}|{_MONTH}[-. ]*\d{{1,2}}\b",
+    r"(?:(?:mon|tue|wed|thu|fri|sat|sun)[a-z]*[,.]? +)?"
+    r"(?:\d{4}([-/.])\d{1,2}\1\d{1,2}(?!\d)|\d{1,2}([-/.])\d{1,2}\2(?:\d{4}|\d{2})(?!\d|\.\d)|\d{8}T\d{4}|\d{1,2}:\d{2}(?!\d)"
+    rf"|\d{{1,2}}[-. ]*{_MONTH}[-. ,]*\d{{2}}|{_MONTH}[-. ]*\d{{1,2}}\b)",
     re.IGNORECASE | re.ASCII,
 )
+_UTC = re.compile(r" *(UTC|GMT)$", re.IGNORECASE)
 _PACKED_DAY = re.compile(r"(19|20)\d\d(0[1-9]|1[0-2])(0[1-9]|[12]\d|3[01])", re.ASCII)
 
 
@@ -161,6 +164,8 @@ class Table:
         Column of the names of the tracks, if the format has tracks and the file has several.
     holds : {"", "positions", "poses"}
         Content of all files of this format: longitudes and latitudes, or poses.
+    time_format : str or None
+        Format of dates, as for ``datetime.strptime``. None for ISO 8601 and RFC 2822.
     """
 
     path: Source
@@ -172,6 +177,7 @@ class Table:
     comma: bool = False
     tracks: str | None = None
     holds: str = ""
+    time_format: str | None = None
 
     def __post_init__(self) -> None:
         """Find the columns of numbers and of dates."""
@@ -248,6 +254,20 @@ class Table:
         left = None if texts is None else lambda name: np.array(texts(name), object)[kept].tolist()
         return replace(self, columns=columns, place=lambda row: place(int(kept[row])), texts=left)
 
+    def without_values(self, words: Sequence[str]) -> Table:
+        """Return the table with missing values in place of these numbers or texts."""
+        values = [float(word) for word in words if is_number(word)]
+        columns: dict[str, Array] = {}
+        for name, column in self.columns.items():
+            if _is_text(column):
+                cells = self.cells(name)
+                gone = np.array([cell in words or (is_number(cell) and float(cell) in values) for cell in cells])
+                columns[name] = np.where(gone, "", np.asarray(column, object)) if gone.any() else column
+            else:
+                gone = np.isin(column, values) if column.dtype.kind in "iuf" and values else np.zeros(len(column), bool)
+                columns[name] = np.where(gone, np.nan, column) if gone.any() else column
+        return replace(self, columns=columns)
+
     def points(self, others: Sequence[str | None]) -> list[str]:
         """Return the columns of the points if none are named: all numeric columns but the others."""
         return self.groups.get("points") or [name for name in self.numeric if name not in others]
@@ -275,6 +295,12 @@ class Table:
         Numeric times count the unit `unix` since 1970, if it is given.
         """
         columns = [self.numbers(name) for name in names]
+        if self.comma:
+            points = [name for name in names if self.columns[name].dtype.kind == "f"]
+            commas = [name for name in names if _is_text(self.columns[name])]
+            point = next((name for name in points if (self.columns[name] % 1 != 0).any()), None)
+            mixed = f": numbers have decimal points in column {point!r}, and decimal commas in column "
+            refuse(self.path, (point and commas, f"{mixed}{''.join(commas[:1])!r}; use one of them"))
         refuse("--unix", (unix and time is None, " is for times that are numbers, and there is no column of times"))
         times, utc = self.times(time, unix) if time is not None else (np.empty(0), False)
         labels = self.labels(label) if label is not None else None
@@ -302,6 +328,15 @@ class Table:
 
     def _parsed(self, name: str) -> NDArray[np.float64]:
         cells = self._plain(name)
+        if self.comma:
+            marks = [
+                next((cell for cell in self.cells(name) if mark in cell and is_number(cell.replace(",", "."))), None)
+                for mark in ".,"
+            ]
+            mixed = (
+                f": column {name!r} has decimal points and decimal commas, {marks[0]} and {marks[1]}; use one of them"
+            )
+            refuse(self.path, (None not in marks, mixed))
         bad = next((row for row, cell in enumerate(cells) if cell and not is_number(cell)), None)
         if bad is not None:
             units = "; if this line holds units, remove it" if bad == 0 else ""
@@ -312,6 +347,8 @@ class Table:
         """Return a column as times, and whether they are dates in UTC, None if this is unknown."""
         column = self.columns[name]
         numeric = name in self.numeric or not (_is_text(column) or column.dtype.kind == "M")
+        if self.time_format is not None:
+            return self._formatted(name, self.time_format)
         refuse("--unix is for times that are numbers", (unix and not numeric, f"; column {name!r} has dates"))
         if numeric:
             times = self._counted(name)
@@ -354,8 +391,27 @@ class Table:
             fraction = np.rint(np.round(times - whole, digits) * scale).astype(np.int64)
         return np.asarray((whole.astype(np.int64) * scale + fraction).astype("datetime64[ns]"))
 
+    def _formatted(self, name: str, form: str) -> tuple[Array, bool]:
+        """Return texts in a format of ``strptime`` as dates, in UTC if the format has a time zone."""
+        _require("dates in a format", "cli", "pandas")
+        import pandas as pd
+
+        cells = self.labels(name)
+        zoned = "%z" in form or form.endswith(("Z", "UTC", "GMT"))
+        try:
+            dates = pd.to_datetime(pd.Series(cells), format=form, errors="coerce", utc=zoned)
+        except ValueError as error:
+            raise Problem(f"--time-format {form}: {brief(error)}") from None
+        wrong = np.flatnonzero(dates.isna())
+        if wrong.size:
+            row = int(wrong[0])
+            raise self._problem(name, row, f"holds {cells[row]!r}, which does not match --time-format {form}")
+        return (dates.dt.tz_convert(None) if zoned else dates).to_numpy(), zoned
+
     def _dates(self, name: str) -> tuple[Array, bool]:
         cells = self.labels(name)
+        if cells and ISO_DATE.fullmatch(cells[0]) is None:
+            cells = _in_iso(cells)
         with suppress(ValidationError):
             times, zone = times_of(cells, "time")
             if isinstance(times, np.ndarray):
@@ -364,7 +420,10 @@ class Table:
         for row, cell in enumerate(cells):
             match = ISO_DATE.fullmatch(cell)
             if match is None:
-                what = "not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z"
+                what = (
+                    "not a time: write 0.5, 2021-08-29 or 2021-08-29T16:55:00Z, or give the format of dates, such as "
+                    "--time-format '%d.%m.%Y %H:%M'"
+                )
             elif first is not None and (match["zone"] is None) != (first["zone"] is None):
                 what = f"but {cells[0]!r} before; give all times a time zone, or none"
             else:
@@ -377,6 +436,16 @@ class Table:
 
     def _problem(self, name: str, row: int, problem: str) -> Problem:
         return Problem(f"{self.path}, {self.place(row)}: column {name!r} {problem}")
+
+
+def _in_iso(cells: Sequence[str]) -> list[str]:
+    """Return dates such as ``"2021-08-29 16:55 UTC"`` or those of RFC 2822 in ISO 8601, and other texts as they are."""
+    texts = [_UTC.sub("Z", cell) for cell in cells]
+    if ISO_DATE.fullmatch(texts[0]):
+        return texts
+    with suppress(ValueError):
+        return [parsedate_to_datetime(cell).isoformat() for cell in cells]
+    return list(cells)
 
 
 def codes_of(labels: Sequence[Any]) -> NDArray[np.intp]:
@@ -427,25 +496,20 @@ class Layout(NamedTuple):
 # The cells of a line ``sep=;``, with which Excel begins.
 _SEPARATOR = ["sep=", ""]
 _COMPLEX = re.compile(r"\(?[-+]?[\d.e]+([-+]?\d+)?([-+][\d.e]+([-+]\d+)?)?j\)?", re.ASCII)
-# The first bytes of text in UTF-16, which spreadsheets write.
-_UTF16 = (b"\xff\xfe", b"\xfe\xff")
 _WRITTEN = 50_000
 """Rows that are written between two updates of the progress."""
 
 
 def _read_csv(path: Source) -> Table:
-    """Read text in UTF-8 with cells separated by commas, semicolons or tabs, and names of columns in the first line.
+    """Read text in UTF-8 or UTF-16 with cells separated by commas, semicolons, tabs or blanks.
 
-    Blank lines are skipped, and a line ``sep=;`` as well. Between semicolons, numbers may have a decimal comma. Complex
-    numbers such as ``(1+2j)``, as pandas writes them, become two columns.
+    The first line names the columns. Blank lines are skipped, a line ``sep=;`` as well, and comments, which begin with
+    #; the last comment above the numbers may name their columns. Between semicolons, numbers may have a decimal comma.
+    Complex numbers such as ``(1+2j)``, as pandas writes them, become two columns.
     """
-    with path.open() as file:
-        first = next(filter(bytes.strip, file), b"")
-    mark = max(",;\t", key=lambda mark: first.count(mark.encode()))
-    rows = _rows(path, mark)
-    _, head, names = next(rows, (0, 0, []))
-    names = [name.strip() for name in names]
+    mark, head, names, skipped = _heading(path)
     twice = first_duplicate([name for name in names if name])
+    rows = _rows(path, mark, head)
     refuse(
         path,
         (not names, " is empty"),
@@ -456,7 +520,7 @@ def _read_csv(path: Source) -> Table:
     )  # fmt: skip
     rows.close()
     missing = [word for text in MISSING for word in (text, text.upper(), text.title(), text.replace("nan", "NaN"))]
-    frame = _frame(path, mark, names, head, keep_default_na=False, na_values=missing)
+    frame = _frame(path, mark, names, skipped, head, keep_default_na=False, na_values=missing)
     columns: dict[str, Array] = {}
     for i, name in enumerate(names):
         if name:
@@ -467,13 +531,52 @@ def _read_csv(path: Source) -> Table:
         if name not in names:
             return list(map(str, columns[name].tolist()))
         i = names.index(name)
-        cells = _frame(path, mark, names, head, usecols=[i], dtype=str, na_filter=False)[i]
+        cells = _frame(path, mark, names, skipped, head, usecols=[i], dtype=str, na_filter=False)[i]
         return list(map(str.strip, cells.tolist()))
 
     def place(row: int) -> str:
-        return f"line {next(islice(_rows(path, mark), row + 1, None))[0]}"
+        return f"line {next(islice(_rows(path, mark, head), row, None))[0]}"
 
     return Table(path, columns, place, texts=texts, comma=mark == ";")
+
+
+class _Heading(NamedTuple):
+    """The separator of cells, the number of the row with the names, the names, and the numbers of rows to skip."""
+
+    mark: str
+    head: int
+    names: list[str]
+    skipped: list[int]
+
+
+def _heading(path: Source) -> _Heading:
+    """Find the names of the columns."""
+    with path.open() as file:
+        lines = list(islice(filter(bytes.strip, file), FIRST))
+        file.seek(0)
+        # Comments below the names are rare, and are searched for at once.
+        later = b"\n#" in file.read()
+    data = [line for line in lines if not line.startswith((b"#", b"sep="))]
+    # Comments may have any marks.
+    first = next(iter(data), b"")
+    mark = max(",;\t", key=lambda mark: first.count(mark.encode()))
+    if mark.encode() not in first and len(first.split()) > 1 and len({len(line.split()) for line in data[:3]}) == 1:
+        mark = " "
+    comments: list[tuple[int, list[str]]] = []
+    for _, number, cells in _rows(path, mark, 0, comments=True):
+        if cells[0].lstrip().startswith("#"):
+            name = cells[0].lstrip("# ")
+            comments.append((number, [name, *cells[1:]] if name else cells[1:]))
+            continue
+        # Names have no numbers below a comment with as many cells.
+        if comments and len(comments[-1][1]) == len(cells) and any(is_number(cell) for cell in cells):
+            number, cells = comments[-1]
+        skipped = list(range(number))
+        if later:
+            below = _rows(path, mark, number, comments=True)
+            skipped += [row - 1 for _, row, cells in below if cells[0].lstrip().startswith("#")]
+        return _Heading(mark, number, [name.strip() for name in cells], skipped)
+    return _Heading(mark, 0, [], [])
 
 
 def _converted(name: str, column: Any) -> dict[str, Array]:
@@ -489,8 +592,8 @@ def _converted(name: str, column: Any) -> dict[str, Array]:
     return {name: texts}
 
 
-def _frame(path: Source, mark: str, names: Sequence[str], head: int, **options: Any) -> Any:
-    """Read the rows below the first ones by pandas; columns are numbered."""
+def _frame(path: Source, mark: str, names: Sequence[str], skipped: list[int], head: int, **options: Any) -> Any:
+    """Read the rows that are not skipped by pandas; columns are numbered."""
     _require("CSV files", "cli", "pandas")
     import pandas as pd
 
@@ -501,12 +604,12 @@ def _frame(path: Source, mark: str, names: Sequence[str], head: int, **options: 
         warnings.simplefilter("error", pd.errors.ParserWarning)
         try:
             return pd.read_csv(
-                file, sep=mark, header=None, names=range(len(names)), index_col=False, skiprows=head,
-                skipinitialspace=True, low_memory=False, **exact, **options
+                file, sep=r"\s+" if mark == " " else mark, header=None, names=range(len(names)), index_col=False,
+                skiprows=skipped, skipinitialspace=True, low_memory=False, **exact, **options
             )  # fmt: skip
         except (pd.errors.ParserError, pd.errors.ParserWarning, UnicodeDecodeError) as error:
             problem = brief(error)
-    for line, _, row in islice(_rows(path, mark), 1, None):
+    for line, _, row in _rows(path, mark, head):
         if len(row) > len(names):
             named = f"{len(row)} cells, but the first line names {len(names)} column{'s' * (len(names) > 1)}"
             named += "; remove lines above the names, such as comments" if len(names) == 1 else ""
@@ -514,19 +617,22 @@ def _frame(path: Source, mark: str, names: Sequence[str], head: int, **options: 
     raise Problem(f"{path}: {problem}")
 
 
-def _rows(path: Source, mark: str) -> Generator[tuple[int, int, list[str]], None, None]:
-    """Yield the line, the number and the cells of every row that is not blank; blank rows are counted."""
+def _rows(path: Source, mark: str, head: int, comments: bool = False) -> Generator[tuple[int, int, list[str]]]:
+    """Yield the line, the number and the cells of every row below the row ``head`` that is not blank.
+
+    Blank rows and comments are counted; comments are yielded only if ``comments`` is True.
+    """
     with path.open() as binary:
         text = io.TextIOWrapper(binary, encoding="utf-8-sig", newline="")
-        reader = csv.reader(text, delimiter=mark, skipinitialspace=True, strict=True)
+        lines: Iterable[str] = map(str.strip, text) if mark == " " else text
+        reader = csv.reader(lines, delimiter=mark, skipinitialspace=True, strict=True)
         try:
             for number, row in enumerate(reader, 1):
-                if row != _SEPARATOR and (len(row) > 1 or "".join(row).strip()):
+                blank = row == _SEPARATOR or not (len(row) > 1 or "".join(row).strip())
+                if number > head and not blank and (comments or not row[0].lstrip().startswith("#")):
                     yield reader.line_num, number, row
         except UnicodeDecodeError:
-            binary.seek(0)
-            encoding = "utf-16" if binary.read(2) in _UTF16 else "cp1252"
-            raise Problem(f"{path} is not text in UTF-8; convert it, such as by iconv -f {encoding} -t utf-8") from None
+            raise Problem(f"{path} is not text in UTF-8; convert it, such as by iconv -f cp1252 -t utf-8") from None
         except csv.Error as error:
             raise Problem(f"{path}, line {reader.line_num}: {error}") from None
         finally:
@@ -578,14 +684,18 @@ def _read_npz(path: Source) -> Table:
     The entries of an array ``a`` with more axes are the columns ``a_0``, ``a_1``, … row by row; complex numbers are
     two columns ``a_0_re`` and ``a_0_im``.
     """
-    columns: dict[str, Array] = {}
-    groups: dict[str, list[str]] = {}
     with path.open() as file:
         refuse(path, (not zipfile.is_zipfile(file), " is not an NPZ file"))
         file.seek(0)
         with damage(path, "is damaged, or holds other objects than numbers"):
             arrays = read(file, lambda name: True)
     refuse(path, ("format" in arrays, " is a curve that was fitted already, not a table"))
+    return _of_arrays(path, arrays)
+
+
+def _of_arrays(path: Source, arrays: Mapping[str, Array]) -> Table:
+    columns: dict[str, Array] = {}
+    groups: dict[str, list[str]] = {}
     for key, array in arrays.items():
         if not array.ndim or array.dtype.kind not in "biufcMmU":
             continue
@@ -598,6 +708,22 @@ def _read_npz(path: Source) -> Table:
         columns |= parts
     utc = _ZONE in arrays and arrays[_ZONE].shape == () and str(arrays[_ZONE]) == "UTC"
     return Table(path, columns, groups=groups, is_utc=dict.fromkeys(columns, True) if utc else {})
+
+
+def _read_npy(path: Source) -> Table:
+    """Read an array with the numbers of one point per row, or a structured array with named columns."""
+    with path.open() as file, damage(path, "is damaged, or not an array of numbers"):
+        array = np.lib.format.read_array(file, allow_pickle=False)
+    names = array.dtype.names
+    return _of_arrays(path, {"points": array} if names is None else {name: array[name] for name in names})
+
+
+def _write_npy(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write a structured array."""
+    table = np.empty(len(next(iter(columns.values()))), [(name, column.dtype) for name, column in columns.items()])
+    for name, column in columns.items():
+        table[name] = column
+    np.save(file, table)
 
 
 def _write_npz(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
@@ -682,17 +808,29 @@ _Row = dict[str, Any]
 
 
 def _read_json(path: Source) -> Table:
-    """Read a list of objects with one value per column, or an object with one list per column."""
+    """Read a list of objects with one value per column, an object with one list per column, or JSON lines."""
     return _table(path, _json(path))
 
 
 def _json(path: Source) -> Any:
     with path.open() as file:
         try:
-            return json.load(file)
+            text = file.read().decode("utf-8-sig")
+            try:
+                return json.loads(text)
+            except json.JSONDecodeError as error:
+                if not error.msg.startswith("Extra data"):
+                    raise
+            return [_json_line(path, i, line) for i, line in enumerate(text.split("\n"), 1) if line.strip()]
         except (ValueError, RecursionError) as error:
-            lines = "; for JSON lines, make one list of them, such as by jq -s ." if "Extra data" in str(error) else ""
-            raise Problem(f"{path} is not JSON: {error}{lines}") from None
+            raise Problem(f"{path} is not JSON: {error}") from None
+
+
+def _json_line(path: Source, number: int, line: str) -> Any:
+    try:
+        return json.loads(line)
+    except ValueError as error:
+        raise Problem(f"{path}, line {number} is not JSON: {error}") from None
 
 
 def _table(path: Source, content: Any) -> Table:
@@ -809,6 +947,12 @@ def _write_json(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) ->
     file.write(f"[\n{lines}\n]\n".encode())
 
 
+def _write_json_lines(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    """Write one object per line."""
+    for row in zip(*_lists(columns, layout).values(), strict=True):
+        file.write(json.dumps(dict(zip(columns, row, strict=True)), ensure_ascii=False).encode() + b"\n")
+
+
 def _write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
     """Write a collection of points, one per row and line, whose other columns are properties."""
     names = _lonlat(columns, layout, "GeoJSON")
@@ -899,7 +1043,9 @@ _FORMATS = {
     "csv": _Format(_read_csv, _write_csv, ("csv", "tsv")),
     "npz": _Format(_read_npz, _write_npz, ("npz",), False),
     "parquet": _Format(_read_parquet, _write_parquet, ("parquet",), False),
+    "npy": _Format(_read_npy, _write_npy, ("npy",), False),
     "json": _Format(_read_json, _write_json, ("json",)),
+    "jsonl": _Format(_read_json, _write_json_lines, ("jsonl", "ndjson")),
     "geojson": _Format(_read_geojson, _write_geojson, ("geojson",)),
     "gpx": _Format(_read_gpx, _write_gpx, ("gpx",)),
     "tum": _Format(_read_tum, _write_tum, ("tum", "txt")),
@@ -909,8 +1055,8 @@ CURVES = ("npz",)
 
 
 def format_of(path: Path, given: str | None, known: Sequence[str] = TABLES, what: str = "a table") -> str:
-    """Return the format of a file: the given one, that of its ending, or the first one for a standard stream."""
-    if given is not None or path == STANDARD:
+    """Return the format of a file: the given one, that of its ending, or the first one for streams and pipes."""
+    if given is not None or path == STANDARD or path.is_fifo():
         return given or known[0]
     name = PurePath(path.name.lower())
     unpacked = PurePath(name.stem) if name.suffix == ".gz" else name
