@@ -1,4 +1,4 @@
-"""Angles of tori in degrees: an option of `symspline fit`, and a warning without it."""
+"""Angles of tori in degrees: an option of `symspline fit`, and an error without it."""
 
 import numpy as np
 import pytest
@@ -31,22 +31,36 @@ def test_angles_in_degrees(run):
 
 
 @pytest.mark.parametrize(
-    "angles, head, warned",
+    "angles, head, says",
     [
-        (DIRECTIONS, "t,dir", "up to 355 look like degrees"),
-        (DIRECTIONS + 1 / 3, "t,dir", "look like degrees"),
-        (np.linspace(0, 3, 8) + 1 / 3, "t,heading_deg", "'heading_deg' means degrees"),
+        (DIRECTIONS, "t,dir", "angles up to 355 may be in degrees"),
+        (DIRECTIONS + 1 / 3, "t,dir", "may be in degrees"),
+        # A wheel with many turns.
+        (np.linspace(0, 13, 8) + 1 / 3, "t,dir", "angles up to 13.3333 may be in degrees"),
+        (np.linspace(0, 3, 8) + 1 / 3, "t,heading_deg", "the name 'heading_deg' means degrees"),
         (np.linspace(0, 3, 8) + 1 / 3, "t,heading (deg)", "means degrees"),
-        (np.radians(DIRECTIONS), "t,dir", ""),
-        # A wheel with many turns, and a joint.
-        (np.linspace(0, 17, 8) + 1 / 3, "t,dir", ""),
-        (np.linspace(-3, 3, 8) + 1 / 3, "t,degree_of_freedom", ""),
     ],
 )
-def test_angles_of_tables_that_look_like_degrees_warn(run, angles, head, warned):
+def test_angles_of_an_unknown_unit_are_refused(run, fails, angles, head, says):
     write("a.csv", rows(angles, head))
-    said = run("fit a.csv --space torus:1 -o a.npz", notes=bool(warned))
-    assert warned in said and ("--degrees" in said) == bool(warned)
+    problem = fails("fit a.csv --space torus:1 -o a.npz")
+    assert says in problem and problem.endswith("; give --degrees or --radians")
+    run("fit a.csv --space torus:1 --radians -o a.npz", notes=None)
+    assert ss.space("torus:1").distance(ss.load("a.npz").points, angles[:, None]).max() < 1e-9
+    assert "not allowed with" in fails("fit a.csv --space torus:1 --radians --degrees -o b.npz")
+
+
+@pytest.mark.parametrize(
+    "angles, head",
+    [
+        (np.radians(DIRECTIONS), "t,dir"),
+        (np.linspace(0, 12, 8), "t,dir"),
+        (np.linspace(-3, 3, 8) + 1 / 3, "t,degree_of_freedom"),
+    ],
+)
+def test_angles_in_radians_need_no_option(run, angles, head):
+    write("a.csv", rows(angles, head))
+    run("fit a.csv --space torus:1 -o a.npz")
 
 
 def test_the_option_is_for_tori(fails):

@@ -14,7 +14,7 @@ from .base import AnySpace
 # Names of the unit in attributes of netCDF files and in column names.
 _NAMES = ("deg", "degs", "degree", "degrees", "°", "arc_degree", "arcdegree", "degree_true", "degrees_true", "degt")
 # Angles in radians rarely exceed two turns, except those of wheels, whose steps are shorter than half a turn.
-_TWO_TURNS = 4 * np.pi
+TWO_TURNS = 4 * np.pi
 _SHARE = 0.1
 
 
@@ -35,7 +35,7 @@ def look_like_degrees(space: AnySpace, points: PointsLike) -> float | None:
         x: Array = np.asarray(part, np.float64).reshape(-1, part.shape[-1])
         x = x[np.isfinite(x).all(axis=1)]
         size = float(np.abs(x).max(initial=0.0))
-        if not (size > _TWO_TURNS and x.min(initial=0.0) >= -180 and size <= 360):
+        if not (size > TWO_TURNS and x.min(initial=0.0) >= -180 and size <= 360):
             continue
         steps = np.abs(np.diff(x, axis=0))
         jumps = np.mean(steps > np.pi) >= _SHARE if steps.size else False

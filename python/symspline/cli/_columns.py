@@ -20,10 +20,10 @@ from .._base.exceptions import SymsplineError
 from .._base.typing import Array
 from .._core import ValidationError
 from .._spaces import Doubles, LogEuclidean, Product, Space, SymmetricPositiveDefinite, Torus, factors_of, space_named
-from .._spaces.degrees import is_degrees, look_like_degrees
+from .._spaces.degrees import TWO_TURNS, is_degrees
 from ..convert._pose_files import join, rotations_in_rows
 from ..geo import NAMED, are_tracks
-from ._messages import Problem, Source, first_duplicate, for_command_line, listed, refuse, say
+from ._messages import Problem, Source, first_duplicate, for_command_line, listed, refuse
 from ._tables import IM, RE, Place, Rows, Table
 
 GLOBE, ROTATIONS, POSES = map(space_named, ("sphere:2", "so:3", "se:3"))
@@ -417,8 +417,8 @@ class PointColumns:
         Whether points are longitude and latitude in degrees.
     quaternion : list of int or None
         The column of each number of a point whose rotation is a quaternion, as in `Columns`.
-    degrees : bool
-        Whether angles of tori are in degrees.
+    degrees : bool or None
+        Whether angles of tori are in degrees. None if the user did not say so.
     """
 
     path: Source
@@ -426,7 +426,7 @@ class PointColumns:
     entries: list[Entry]
     lonlat: bool
     quaternion: list[int] | None
-    degrees: bool = False
+    degrees: bool | None = None
 
     @property
     def names(self) -> list[str]:
@@ -467,7 +467,7 @@ class PointColumns:
             else:
                 part = columns.view(factor.dtype).reshape(len(columns), *factor.point_shape)
             if isinstance(factor, Torus):
-                self._warn_of_degrees(factor, part, names[start:end] if len(names) == ends[-1] else [])
+                self._refuse_degrees(factor, part, names[start:end] if len(names) == ends[-1] else [])
                 part = np.radians(part) if self.degrees else part
             parts.append(self._projected(factor, part, place))
         return tuple(parts) if isinstance(self.space, Product) else parts[0]
@@ -483,13 +483,13 @@ class PointColumns:
         positions = from_lonlat(*numbers[:, :2].T)
         return (positions, np.ascontiguousarray(numbers[:, 2:])) if self.space == WITH_HEIGHT else positions
 
-    def _warn_of_degrees(self, torus: Space, angles: Array, names: Sequence[str]) -> None:
-        """Warn if angles in radians look like degrees, by their values or the names of their columns."""
-        largest = look_like_degrees(torus, angles)
+    def _refuse_degrees(self, torus: Space, angles: Array, names: Sequence[str]) -> None:
+        """Raise `Problem` if angles of an unknown unit may be in degrees, by their values or their names."""
+        largest = float(np.abs(angles).max(initial=0.0))
         named = [name for name in names if is_degrees(_UNIT.sub("", name))]
-        if not self.degrees and (largest is not None or named):
-            why = f"angles up to {largest:g} look like degrees" if largest else f"the name {named[0]!r} means degrees"
-            say(f"{self.path}: {why}, but angles on {torus} are in radians; give --degrees if they are in degrees")
+        if self.degrees is None and (largest > TWO_TURNS or named):
+            why = f"the name {named[0]!r} means degrees" if named else f"angles up to {largest:g} may be in degrees"
+            raise Problem(f"{self.path}: {why}, but angles on {torus} are in radians; give --degrees or --radians")
 
     def _projected(self, factor: Space, points: Array, place: Place) -> Array:
         doubles = factor._doubles(points, "points")

@@ -1,45 +1,45 @@
 """Fit C² splines to the points in a table, through them or, with --smooth, near them
 
-A table is a CSV, NPZ, NPY, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --from selects
-the format. Every row is a point at a time. Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55 or
-2021-08-29T16:55:00.5+02:00, or dates such as Sun, 29 Aug 2021 16:55:00 GMT, all with a time zone or all without. Dates
-with Z, UTC or an offset are converted to UTC, and rates are per second. --time-format reads other dates.
+A table is a CSV, NPZ, NPY, Parquet, JSON, GeoJSON or GPX file or a TUM trajectory; the ending of its name or --from
+selects the format. Every row is a point at a time. Times are numbers, or ISO dates such as 2021-08-29, 2021-08-29 16:55
+or 2021-08-29T16:55:00.5+02:00, or dates such as Sun, 29 Aug 2021 16:55:00 GMT, all with a time zone or all without.
+Dates with Z, UTC or an offset are converted to UTC, and rates are per second. --time-format reads other dates.
 
-The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix row
-by row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns
-calls A, or one column A, with texts such as (1+2j) in CSV files or if it is real. Rounded points are projected onto the
-space, within 1e-4 if they have at most nine significant digits. A rotation of so:3 may also be a unit quaternion in
-columns whose names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3 a position, such as tx, ty, tz,
-and a quaternion. Angles of torus:n are in radians, or with --degrees in degrees.
+The numbers of a point are in columns in the order of its array, and --columns names them in that order: a matrix row by
+row, in a product one factor after the other. A complex number A has the columns A_re and A_im, which --columns calls A,
+or one column A, with texts such as (1+2j) in CSV files or if it is real. Rounded points are projected onto the space,
+within 1e-4 if they have at most nine significant digits. A rotation of so:3 may also be a unit quaternion in columns
+whose names end in w, x, y and z, in any order, and a pose of se:3 or so:3 x r:3 a position, such as tx, ty, tz, and a
+quaternion. Angles of torus:n, such as headings, are in radians, or with --degrees in degrees.
 
 Without --time, the times are in the column t or time, or, if they are dates, in a column that is called time, date,
-datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix, base, local, ns: ISO_TIME,
-"Date (UTC)". The command asks if another column seems to hold times. Without any, times are 0, 1, 2, ... Numbers in
-the column of times have no unit; with --unix ns they are nanoseconds since 1970, and become dates in UTC.
+datetime, stamp or timestamp, in the plural or with words such as iso, utc, unix, base, local, ns: ISO_TIME, "Date
+(UTC)". The command asks if another column seems to hold times. Without any, times are 0, 1, 2, ... Numbers in the
+column of times have no unit; with --unix ns they are nanoseconds since 1970, and become dates in UTC.
 
 CSV files, which pandas reads, name the columns in their first line; blank lines and comments after # are skipped. Cells
-are separated by commas, semicolons, tabs or blanks, and between semicolons numbers may have decimal commas. In an NPZ file columns are arrays
-with one entry per row, which may be complex, or vectors or matrices; an array `points` may hold all numbers of the
-points. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw, on so:3 x r:3. GPX and
-GeoJSON files imply --lonlat, and each of their tracks, segments and lines is a curve of its own, whose name is in the
-column track; --curve none makes one curve of all. Positions with a column of heights, such as ele, are on
-sphere:2 x r:1; --space sphere:2 omits the heights. With --skipna, rows without a point are omitted.
+are separated by commas, semicolons, tabs or blanks, and between semicolons numbers may have decimal commas. In an NPZ
+file columns are arrays with one entry per row, which may be complex, or vectors or matrices; an array `points` may hold
+all numbers of the points. A .tum or .txt file is a trajectory of the TUM benchmark: time tx ty tz qx qy qz qw, on so:3
+x r:3. GPX and GeoJSON files imply --lonlat, and each of their tracks, segments and lines is a curve of its own, whose
+name is in the column track; --curve none makes one curve of all. Positions with a column of heights, such as ele, are
+on sphere:2 x r:1; --space sphere:2 omits the heights. With --skipna, rows without a point are omitted.
 
-Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data
-suggest, and symspline sample also writes its standard deviation. With --smooth adaptive, the smoothness varies along
-the curve if the data require it, for motion that rests and bursts.
+Curves pass through the points. --smooth is for noisy points: the curve passes near them, as smooth as the data suggest,
+and symspline sample also writes its standard deviation. With --smooth adaptive, the smoothness varies along the curve
+if the data require it, for motion that rests and bursts.
 
 examples:
   symspline fit track.csv --lonlat -o track.npz
   symspline fit storms.csv --lonlat --time date --curve storm -o storms.npz
   symspline fit attitude.parquet --space so:3 --columns w,x,y,z --bc-type not-a-knot -o attitude.npz
   symspline fit states.csv --space cp:1 --columns up,down -o states.npz
+  symspline fit wind.csv --space torus:1 --columns direction --degrees -o wind.npz
   symspline fit gps.csv --lonlat --smooth -o gps.npz
   symspline fit hand.csv --space r:3 --smooth adaptive --noise adaptive -o hand.npz
 
 symspline.load reads the curve in Python. With --curve, it returns a dictionary of all curves by name, and with
---max-gap alone a SegmentedCurve.
-"""
+--max-gap alone a SegmentedCurve."""
 
 from __future__ import annotations
 
@@ -171,7 +171,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--columns", metavar="A,B,...", help="columns of a point (default: all other numeric columns)")
     add("--curve", metavar="COL", help=_CURVE)
     add("--lonlat", action="store_true", help="points are longitude and latitude in degrees, and perhaps a height")
-    add("--degrees", action="store_true", help="angles of torus:n are in degrees, also in the samples of the curve")
+    unit = parser.add_mutually_exclusive_group().add_argument
+    degrees = "angles of torus:n, such as headings, are in degrees, also in the samples of the curve"
+    unit("--degrees", action="store_const", const=True, help=degrees)
+    radians = "angles of torus:n are in radians, also those beyond two turns (4 pi), which are otherwise refused"
+    unit("--radians", dest="degrees", action="store_const", const=False, help=radians)
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
     add("--skipna", action="store_true", help="omit rows without a point or a time: empty cells, NaN, NA or null")
@@ -262,7 +266,10 @@ def _space(options: argparse.Namespace, table: Table) -> Space:
     if options.lonlat:
         require_globe(space)
     on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
-    refuse("--degrees", (options.degrees and not on_torus, f" is for torus:n and products with it, not for {space}"))
+    flag = "--degrees" if options.degrees else "--radians"
+    refuse(
+        flag, (options.degrees is not None and not on_torus, f" is for torus:n and products with it, not for {space}")
+    )
     return space
 
 
@@ -275,7 +282,7 @@ def _in_radians(options: argparse.Namespace, space: Space) -> Any:
         f"such as --sigma {given},5; --space sphere:2 fits positions without heights"
     )
     refuse("", (options.lonlat and space == WITH_HEIGHT and not several, heights))
-    degrees = [in_degrees(part, options.lonlat, options.degrees) for part in parts]
+    degrees = [in_degrees(part, options.lonlat, bool(options.degrees)) for part in parts]
     if several and len(given) == len(parts):
         return tuple(math.radians(sigma) if part else sigma for sigma, part in zip(given, degrees, strict=True))
     return math.radians(given) if all(degrees) and not several else given
@@ -344,7 +351,7 @@ def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Reco
     data = Recordings(table, rows, time, points, options, whole.height - table.height)
     cut = options.max_gap is not None and curve is not None
     names = points.names, time or "time", curve or "curve"
-    return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, options.degrees)
+    return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, bool(options.degrees))
 
 
 def _fitted(
