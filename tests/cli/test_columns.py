@@ -85,7 +85,7 @@ def test_columns_of_complex_numbers(run):
         swapped = np.flip(spline.points, axis=1)
         np.testing.assert_array_equal(loaded.points, swapped if names[:7] == "down_im" else spline.points)
     run("fit a.csv --space cp:1 --columns up,down -o a.npz")
-    run("sample a.npz --every 1 -o b.csv")
+    run("sample a.npz --every 1 --digits 17 -o b.csv")
     assert list(table("b.csv")) == ["time", "up_re", "up_im", "down_re", "down_im"]
     written = numbers(table("b.csv"), "up_re", "up_im", "down_re", "down_im").view(complex)
     np.testing.assert_array_equal(written, spline([0, 1, 2]))

@@ -23,7 +23,7 @@ def test_angles_in_degrees(run):
     off = np.degrees(curve(x)[:, 0]) - expected(x)[:, 0]
     assert np.abs((off + 180) % 360 - 180).max() < 1e-9
     write("x.csv", "t\n" + "\n".join(map(repr, x.tolist())) + "\n")
-    run("sample a.npz --at x.csv --nu 0,1 -o b.csv")
+    run("sample a.npz --at x.csv --nu 0,1 --digits 17 -o b.csv")
     found = numbers(table("b.csv"), "dir", "dir_d1")
     off = found[:, 0] - expected(x)[:, 0]
     assert np.abs((off + 180) % 360 - 180).max() < 1e-9

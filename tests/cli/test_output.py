@@ -3,12 +3,14 @@
 import os
 import shlex
 import sys
+import time
 import warnings
 from pathlib import Path
 
 import pytest
 from tabular import AXES, write
 
+from symspline import fit_many
 from symspline.cli import main
 from symspline.cli._curves import read_curves
 
@@ -70,13 +72,25 @@ def test_warnings_of_the_library_are_messages(curves, run, monkeypatch, line):
 
 
 def test_progress_on_a_terminal(curves, capsys, monkeypatch):
-    monkeypatch.setattr("symspline.cli._messages._WAIT", 0)
-    monkeypatch.setattr("symspline.cli._tables._WRITTEN", 2000)
+    """The line also moves while a single step takes long."""
+
+    def slow(*arguments, progress, **options):
+        time.sleep(0.2)
+        progress(1, 4)
+        time.sleep(0.2)
+        return fit_many(*arguments, **options)
+
+    monkeypatch.setattr("symspline.cli._messages._WAIT", 0.03)
+    monkeypatch.setattr("symspline.cli._fit.fit_many", slow)
+    assert main(shlex.split("fit a.csv --space s:2 -o b.npz")) == 0
+    assert "\r" not in capsys.readouterr().err
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    assert main(shlex.split("sample a.npz -n 5000 -o b.csv")) == 0
+    assert main(shlex.split("fit a.csv --space s:2 -o b.npz")) == 0
     shown = capsys.readouterr().err
-    assert "\rsampling: 100 %" in shown and "\rwriting: 40 %" in shown
-    assert shown.endswith(" \rb.csv: 5000 rows\n")
+    assert "\rfitting: 0 s\r" in shown and "\rfitting: 25 %, 0 s\r" in shown
+    assert " \rb.npz: 1 curve" in shown
+    assert main(shlex.split("fit a.csv --space s:2 -o b.npz -q")) == 0
+    assert capsys.readouterr().err == ""
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links and pipes as on POSIX systems")

@@ -27,7 +27,7 @@ def test_a_pipe_of_two_commands():
     assert fitted.stderr.decode().startswith("standard output: 1 curve through 3 points of sphere:2")
     Path("a.npz").write_bytes(fitted.stdout)
     assert ss.load("a.npz") == ss.CubicSpline([0, 1, 3], np.eye(3), "s:2")
-    sampled = process("sample - --every 0.5 -o -", fitted.stdout)
+    sampled = process("sample - --every 0.5 --digits 17 -o -", fitted.stdout)
     assert (sampled.returncode, sampled.stderr) == (0, b"standard output: 7 rows\n")
     lines = sampled.stdout.decode().split("\n")
     assert lines[0] == "t,x,y,z" and lines[-1] == "" and len(lines) == 9
@@ -104,7 +104,7 @@ def test_formats_that_are_written_can_be_read(run):
     run("fit a.csv --lonlat -o curve.npz")
     spline = ss.load("curve.npz")
     for name in ("b.json", "b.geojson", "b.csv.gz", "b.tsv"):
-        run(f"sample curve.npz --every 1h -o {name}")
+        run(f"sample curve.npz --every 1h --digits 17 -o {name}")
         run(f"fit {name} --lonlat -o again.npz")
         again = ss.load("again.npz")
         np.testing.assert_array_equal(again.t, np.arange("2021-08-29T00", "2021-08-29T19", dtype="M8[h]"))

@@ -15,7 +15,7 @@ def test_curves_in_one_file(run):
     e = np.eye(3)
     fitted = ss.fit_many([([0, 2, 3], e[[0, 2, 1]]), ([1, 2], e[1:])], "s:2")
     assert ss.load("pair.npz") == dict(zip("ab", fitted, strict=True))
-    run("sample pair.npz --every 0.5 -o out.csv")
+    run("sample pair.npz --every 0.5 --digits 17 -o out.csv")
     columns = table("out.csv")
     assert list(columns) == ["t", "id", "x", "y", "z"]
     assert columns["id"] == ["a"] * 7 + ["b"] * 3

@@ -36,7 +36,7 @@ def test_a_fit_is_that_of_the_library(run):
     spline = ss.CubicSpline([0, 1, 3], np.eye(3), "sphere:2", bc_type=("not-a-knot", "clamped"), extrapolate="geodesic")
     loaded = ss.load("axes.npz")
     assert loaded == spline and loaded.extrapolate == "geodesic"
-    run("sample axes.npz -n 7 --nu 0,1,2 -o out.csv")
+    run("sample axes.npz -n 7 --nu 0,1,2 --digits 17 -o out.csv")
     columns = table("out.csv")
     assert list(columns) == ["t", *(f"{x}{end}" for end in ("", "_d1", "_d2") for x in "xyz")]
     x = np.linspace(0, 3, 7)
@@ -87,15 +87,15 @@ def test_samples_at_given_times(run, fails):
     run("fit pair.csv --space s:2 --curve id -o pair.npz")
     a, b = ss.load("pair.npz").values()
     write("at.csv", "id,t\nb,1.5\na,0.5\nb,1.25\n")
-    run("sample pair.npz --at at.csv -o out.csv")
+    run("sample pair.npz --at at.csv --digits 17 -o out.csv")
     columns = table("out.csv")
     assert (columns["id"], columns["t"]) == (["b", "a", "b"], ["1.5", "0.5", "1.25"])
     np.testing.assert_array_equal(numbers(columns, *"xyz"), [b(1.5), a(0.5), b(1.25)])
     np.savez("at.npz", T=[1.5, 1.25])
-    run("sample pair.npz --at at.npz -o out.csv")
+    run("sample pair.npz --at at.npz --digits 17 -o out.csv")
     assert table("out.csv")["id"] == ["a", "a", "b", "b"]
     write("at.csv", "when\n1\n")
-    run("sample pair.npz --at at.csv -o out.csv")
+    run("sample pair.npz --at at.csv --digits 17 -o out.csv")
     write("at.csv", "t,id\n1.5,q\n")
     assert fails("sample pair.npz --at at.csv -o x.csv") == "at.csv, line 2: there is no curve 'q'; there are a, b"
     write("at.csv", "t\n1.5\n2.5\n")
@@ -109,8 +109,10 @@ def test_samples_at_given_times(run, fails):
 
 def test_invalid_usage_fails(curves, fails):
     assert fails("ft").endswith("invalid choice: 'ft'; did you mean fit? (see symspline --help)")
-    assert "invalid choice: 'x'; choose from fit, sample, plot, check, info" in fails("x")
-    assert fails("fit a.csv --space s:2") == "the following arguments are required: -o (see symspline fit --help)"
+    assert "invalid choice: 'x'; choose from fit, sample, resample, plot, check, info" in fails("x")
+    assert (
+        fails("fit a.csv --space s:2") == "the following arguments are required: -o/--output (see symspline fit --help)"
+    )
     problem = "unrecognized arguments: --tiem t; did you mean --time? (see symspline fit --help)"
     assert fails("fit a.csv --space s:2 --tiem t -o b.npz") == problem
     assert "--every -n --at is required" in fails("sample a.npz -o b.csv")

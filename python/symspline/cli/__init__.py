@@ -5,6 +5,7 @@ example:
   symspline check track.npz
   symspline sample track.npz --every 10min -o smooth.csv
   symspline plot track.npz -o track.png
+  symspline resample track.csv --lonlat --every 10min -o smooth.csv
   symspline fit - --lonlat -o - < track.csv | symspline sample - -n 100 -o - | head
 
 See also `symspline VERB --help`, and `symspline info` for the spaces and formats of files. Exit codes: 0 success, 1 not
@@ -28,7 +29,7 @@ from typing import Any, NoReturn
 from .._base import VERSION
 from .._base.exceptions import ConvergenceError, SymsplineError
 from .._base.typing import Keywords
-from . import _check, _fit, _info, _plot, _sample
+from . import _check, _fit, _info, _plot, _resample, _sample
 from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, printed_warnings, say, set_level
 
 __all__ = ["main"]
@@ -89,7 +90,7 @@ def _parser() -> _Parser:
     parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
     _add_completion(parser)
     verbs = parser.add_subparsers(metavar="VERB")
-    for verb in (_fit, _sample, _plot, _check, _info):
+    for verb in (_fit, _sample, _resample, _plot, _check, _info):
         texts = _texts_of(verb.__doc__)
         summary = texts["description"].partition("\n")[0]
         command = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)

@@ -75,6 +75,8 @@ class Columns:
         Whether NAME/1, NAME/2, ... are the segments of one recording, which was cut at gaps.
     degrees : bool
         Whether angles of tori are in degrees.
+    decimals : dict or None
+        Number of decimals of every column in tables of text. None for all significant digits.
     """
 
     points: list[str]
@@ -85,6 +87,7 @@ class Columns:
     quaternion: list[int] | None = None
     cut: bool = False
     degrees: bool = False
+    decimals: dict[str, int] | None = None
 
 
 # ---- times ----
@@ -268,6 +271,31 @@ def require_globe(space: Space) -> None:
 def in_degrees(factor: Space, lonlat: bool, degrees: bool) -> bool:
     """Whether distances on a factor of a space are in degrees, on the command line and in tables."""
     return (lonlat and factor == GLOBE) or (degrees and isinstance(factor, Torus))
+
+
+_ACCURATE = 8
+"""Significant digits that samples have at least, as data such as 1 are not as inaccurate as they look."""
+_DOUBLE = 13
+"""Numbers with more significant digits are as accurate as floating-point numbers."""
+
+
+def decimals_of(names: Sequence[str], numbers: Doubles) -> dict[str, int] | None:
+    """Return the number of decimals with which columns are written.
+
+    They are two more than in the table, and at least eight significant digits. None if a column is in double precision.
+    """
+    decimals = {}
+    for name, column in zip(names, numbers.T, strict=True):
+        size = math.ceil(math.log10(max(float(np.abs(column).max()), 1e-300)))
+        for places in range(max(0, _DOUBLE - size) + 1):
+            scaled = column * 10.0**places
+            # Both the number and its multiple are rounded.
+            if (np.abs(scaled - np.rint(scaled)) <= 2 * np.spacing(np.abs(scaled))).all():
+                decimals[name] = max(places + 2, _ACCURATE - size)
+                break
+        else:
+            return None
+    return decimals
 
 
 def suggested(table: Table) -> str:

@@ -162,6 +162,9 @@ def _suit(columns: Columns, space: Space) -> bool:
     flags = (columns.lonlat, columns.cut, columns.degrees)
     if not isinstance(names, list) or not all(isinstance(text, str) for text in (*names, columns.time, columns.curve)):
         return False
+    decimals = columns.decimals
+    if decimals is not None and not (isinstance(decimals, dict) and all(type(n) is int for n in decimals.values())):
+        return False
     if not all(isinstance(flag, bool) for flag in flags) or columns.utc not in (True, False, None):
         return False
     if order is None:

@@ -79,6 +79,7 @@ from ._columns import (
     column_of_blocks,
     column_of_names,
     column_of_tracks,
+    decimals_of,
     height_in,
     in_degrees,
     point_columns,
@@ -161,6 +162,13 @@ _NEAR |= {"penalty": "--penalty"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline fit``."""
+    out = "file of curves to write: .npz, or - for standard output"
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT", required=True, help=out)
+    add_fit(parser)
+
+
+def add_fit(parser: argparse.ArgumentParser) -> None:
+    """Add the options of a fit."""
     add = parser.add_argument
     add("input", type=Path, metavar="IN", help=f"table to read: {endings()}, or - for standard input")
     add("--from", dest="format", choices=TABLES, help="format of the table (default: as its name ends, CSV for -)")
@@ -186,8 +194,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--method", metavar="M", help=_METHODS)
     add("--tol", type=number, help="relative C² residual that counts as converged (default: 1e-12)")
     add("--extrapolate", choices=_POLICIES, help=_EXTRAPOLATE)
-    out = "file of curves to write: .npz, or - for standard output"
-    add("-o", dest="output", type=Path, metavar="OUT", required=True, help=out)
     add = parser.add_argument_group("noisy data").add_argument
     add("--smooth", nargs="?", const="constant", choices=_ADAPTIVE, help=_SMOOTH)
     add("--criterion", choices=("gcv", "cp", "reml"), help=_CRITERION)
@@ -225,6 +231,16 @@ def run(options: argparse.Namespace) -> int:
     """Read, fit and write."""
     format_of(options.output, None, CURVES, "a file of curves")
     check_target(options.output, options.input, binary=True)
+    curves, description, notes = fit_table(options)
+    write_curves(options.output, curves)
+    tell(f"{called(options.output)}: {description}")
+    for note in notes:
+        say(note)
+    return 0
+
+
+def fit_table(options: argparse.Namespace) -> tuple[Curves, str, list[str]]:
+    """Read a table and fit its curves. Return them, their description, and doubts about them."""
     if options.space is not None:
         space_named(options.space)
     table = replace(open_table(options.input, options.format), time_format=options.time_format)
@@ -235,15 +251,12 @@ def run(options: argparse.Namespace) -> int:
     curves = _fitted(data, columns, options, keywords)
     far = outliers(data, curves, columns) if options.loss is None else ""
     segmented = options.max_gap is not None and options.curve is None
-    named = dict(zip(data.groups, curves, strict=True))
-    write_curves(options.output, Curves(named, data.named, columns, segmented))
     words = f"{fitted(curves, columns)}{data.changes()}{bridged(curves)}"
     if not data.has_times and options.time is None:
         words += "; no column of times: the points are at 0, 1, 2, ..."
-    tell(f"{called(options.output)}: {words}")
-    for note in filter(None, (far and f"{data.path}, {far}", data.doubt())):
-        say(note)
-    return 0
+    notes = [far and f"{data.path}, {far}", data.doubt()]
+    named = dict(zip(data.groups, curves, strict=True))
+    return Curves(named, data.named, columns, segmented), words, [*filter(None, notes)]
 
 
 def _space(options: argparse.Namespace, table: Table) -> Space:
@@ -351,7 +364,8 @@ def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Reco
     data = Recordings(table, rows, time, points, options, whole.height - table.height)
     cut = options.max_gap is not None and curve is not None
     names = points.names, time or "time", curve or "curve"
-    return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, bool(options.degrees))
+    decimals = decimals_of(points.used, rows.numbers)
+    return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, bool(options.degrees), decimals)
 
 
 def _fitted(

@@ -10,6 +10,7 @@ import re
 import shutil
 import sys
 import tempfile
+import threading
 import time
 import warnings
 import zlib
@@ -46,7 +47,7 @@ _FOR_PYTHON = {
 
 # Messages may quote any part of a file.
 _LONGEST = 1000
-_WAIT = 0.3
+_WAIT = 1.0
 """Seconds between two updates; shorter work shows nothing."""
 
 
@@ -146,30 +147,38 @@ def printed_warnings(text: Callable[[object], str] = str) -> Iterator[None]:
 
 
 class Progress:
-    """Update one line on stderr if it is a terminal, and clear it at the end; with ``-v``, print the time taken.
+    """Update one line on stderr every second if it is a terminal, and clear it at the end; with ``-v``, print the time.
 
-    Call an instance with the amount done and the total, from any loop or by the library.
+    Call an instance with the amount done and the total, from any loop or by the library. The line has the time taken,
+    too, so that it also moves during a single long step.
     """
 
     def __init__(self, work: str) -> None:
         self._work = work
         self._width = 0
+        self._done = ""
 
     def __enter__(self) -> Self:
         self._start = time.monotonic()
-        self._next = self._start + _WAIT
-        self._shows = _level > QUIET and sys.stderr is not None and sys.stderr.isatty()
+        self._ended = threading.Event()
+        self._line = threading.Thread(target=self._update, daemon=True)
+        if _level > QUIET and sys.stderr is not None and sys.stderr.isatty():
+            self._line.start()
         return self
 
     def __call__(self, done: int, total: int) -> None:
-        if not self._shows or total <= 0 or time.monotonic() < self._next:
-            return
-        self._next = time.monotonic() + _WAIT
-        line = f"{self._work}: {100 * done // total} %"
-        self._width = max(self._width, len(line))
-        print("\r" + line, end="", file=sys.stderr, flush=True)
+        self._done = f" {100 * done // total} %," if total > 0 else ""
+
+    def _update(self) -> None:
+        while not self._ended.wait(_WAIT):
+            line = f"{self._work}:{self._done} {time.monotonic() - self._start:.0f} s"
+            self._width = max(self._width, len(line))
+            print("\r" + line.ljust(self._width), end="", file=sys.stderr, flush=True)
 
     def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        if self._line.is_alive():
+            self._line.join()
         if self._width:
             print("\r" + " " * self._width, end="\r", file=sys.stderr, flush=True)
         tell(f"{self._work} took {time.monotonic() - self._start:.2f} s", VERBOSE)

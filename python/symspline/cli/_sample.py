@@ -93,6 +93,8 @@ from ._tables import (
 
 _EACH = "{curve}"
 """Replaced by the name of a curve in the name of the output."""
+_SIGNIFICANT = 10
+"""Significant digits of rates and standard errors in text, if those of points are known."""
 _MOST = 10**9
 """The largest number of samples of one curve."""
 Times = Array
@@ -122,6 +124,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options of ``symspline sample``."""
     add = parser.add_argument
     add("curves", type=Path, metavar="CURVE", help="file of curves to read: .npz, or - for standard input")
+    which = add_output(parser)
+    which.add_argument("--at", type=Path, metavar="FILE", help=f"a table with times: {endings()}, or -")
+    add("--curve", action="append", metavar="NAME", help="which curve; may be repeated (default: all)")
+    add("--unix", choices=UNITS, help="times of --at are numbers that count this unit since 1970-01-01 in UTC")
+    add("--lonlat", action="store_true", help="write longitude and latitude of any curve on sphere:2")
+    time = "column of times in the table of --at (default: that of the table that was fitted)"
+    add("--time", metavar="COL", help=time)
+    add("--from", dest="format", choices=TABLES, help="format of the table of --at (default: as its name ends)")
+
+
+def add_output(parser: argparse.ArgumentParser) -> Any:
+    """Add the options of samples, and return the group of their times."""
+    add = parser.add_argument
     which = parser.add_mutually_exclusive_group(required=True)
     steps = (
         "a step: for dates a duration in ns, us, ms, s (or no unit), min, h or d, with samples at its whole multiples "
@@ -130,19 +145,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     which.add_argument("--every", metavar="DT", help=steps)
     count = "the number of equidistant samples from the start to the end"
     which.add_argument("-n", dest="number", type=_count, metavar="N", help=count)
-    which.add_argument("--at", type=Path, metavar="FILE", help=f"a table with times: {endings()}, or -")
-    add("--curve", action="append", metavar="NAME", help="which curve; may be repeated (default: all)")
-    add("--unix", choices=UNITS, help="times of --at are numbers that count this unit since 1970-01-01 in UTC")
     orders = "points (0, default), velocities (1), accelerations (2)"
     add("--nu", type=_orders, default=[0], metavar="0,1,2", help=orders)
-    add("--lonlat", action="store_true", help="write longitude and latitude of any curve on sphere:2")
-    add("--digits", type=_digits, metavar="N", help="round the numbers to N significant digits, but not the times")
-    time = "column of times in the table of --at (default: that of the table that was fitted)"
-    add("--time", metavar="COL", help=time)
-    add("--from", dest="format", choices=TABLES, help="format of the table of --at (default: as its name ends)")
+    digits = (
+        "round the numbers to N significant digits, but not the times (default: points in text two decimals more than "
+        "the table that was fitted; 17 for all)"
+    )
+    add("--digits", type=_digits, metavar="N", help=digits)
+    add("--lines", action="store_true", help="GeoJSON with one line per curve instead of points")
     add("--to", choices=TABLES, help="format to write (default: as the name of OUT ends, CSV for -)")
     out = f"table to write: {endings()}, or - for standard output; {_EACH} in its name makes one file per curve"
-    add("-o", dest="output", type=Path, metavar="OUT", required=True, help=out)
+    add("-o", "--output", type=Path, metavar="OUT", required=True, help=out)
+    return which
 
 
 def _count(text: str) -> int:
@@ -167,19 +181,37 @@ def _digits(text: str) -> int:
 
 def run(options: argparse.Namespace) -> int:
     """Evaluate, and write the table."""
-    form, inputs = format_of(options.output, options.to), (options.curves, options.at)
-    check_inputs(*inputs)
-    check_target(options.output, *inputs, binary=is_binary(form))
+    check_inputs(options.curves, options.at)
+    check_output(options, options.curves, options.at)
     whole = read_curves(options.curves, options.lonlat)
-    curves = whole.chosen(options.curve)
+    return sample(whole, whole.chosen(options.curve), options, options.curves, options.at)
+
+
+def check_output(options: argparse.Namespace, *inputs: Path | None) -> str:
+    """Return the format of the output, which must be possible."""
+    form = format_of(options.output, options.to)
+    check_target(options.output, *inputs, binary=is_binary(form))
+    lines = "--lines is for GeoJSON with points; "
+    refuse(
+        lines,
+        (options.lines and form != "geojson", f"{form} has none"),
+        (options.lines and options.nu != [0], "omit --nu"),
+    )
+    return form
+
+
+def sample(whole: Curves, curves: Curves, options: argparse.Namespace, *inputs: Path | None) -> int:
+    """Evaluate some curves of a file, and write the table; the inputs are not overwritten."""
+    form = format_of(options.output, options.to)
     tum = form == "tum"
     columns = _tum_columns(curves, options.nu) if tum else curves.columns
     parts = _along(curves, options) if options.at is None else _given(options, curves, whole)
-    samples = _sampled(curves, parts, options, columns, not tum)
+    text = not is_binary(form) and not tum
+    samples = _sampled(curves, parts, options, columns, not tum, columns.decimals if text else None)
     if _EACH not in options.output.name:
         if tum:
             _check_order(curves)
-        _write(options.output, form, parts, samples, columns, curves.named and not tum)
+        _write(options.output, form, parts, samples, columns, curves.named and not tum, options.lines)
         return 0
     names = [options.output.name.replace(_EACH, part.name.replace("/", "_")) for part in parts]
     paths = [options.output.with_name(name) for name in names]
@@ -188,12 +220,17 @@ def run(options: argparse.Namespace) -> int:
     for path in paths:
         check_target(path, *inputs)
     for path, part, block in zip(paths, parts, samples, strict=True):
-        _write(path, form, [part._replace(rows=None)], [block], columns, False)
+        _write(path, form, [part._replace(rows=None)], [block], columns, False, options.lines)
     return 0
 
 
 def _sampled(
-    curves: Curves, parts: Sequence[_Part], options: argparse.Namespace, columns: Columns, stds: bool
+    curves: Curves,
+    parts: Sequence[_Part],
+    options: argparse.Namespace,
+    columns: Columns,
+    stds: bool,
+    decimals: Mapping[str, int] | None,
 ) -> list[Samples]:
     """Return the columns of every curve, with standard deviations if all curves have them and ``stds`` is True."""
     smooth = stds and all(isinstance(spline, SmoothingSpline) for spline in curves.splines.values())
@@ -204,21 +241,31 @@ def _sampled(
             spline = curves.splines[part.name]
             blocks = [function(spline, part.times, nu, columns) for nu in options.nu for function in functions]
             pairs = chain.from_iterable(blocks)
-            samples.append([(name, _rounded(numbers, options.digits)) for name, numbers in pairs])
+            samples.append([(name, _rounded(name, numbers, options.digits, decimals)) for name, numbers in pairs])
             progress(done, len(parts))
     return samples
 
 
-def _rounded(numbers: Doubles, digits: int | None) -> Doubles:
-    """Round to significant digits."""
-    if digits is None:
+def _rounded(name: str, numbers: Doubles, digits: int | None, decimals: Mapping[str, int] | None) -> Doubles:
+    """Round to significant digits if they are given, and otherwise to the decimals of a column."""
+    if digits is None and decimals is None:
         return numbers
-    texts = (f"{number:.{digits - 1}e}" for number in numbers.tolist())
+    if digits is None and decimals is not None and name in decimals:
+        # Adding zero makes -0 a 0.
+        return np.round(numbers, decimals[name]) + 0.0
+    accuracy = _SIGNIFICANT if digits is None else digits
+    texts = (f"{number:.{accuracy - 1}e}" for number in numbers.tolist())
     return np.fromiter(map(float, texts), np.float64, len(numbers))
 
 
 def _write(
-    path: Path, form: str, parts: Sequence[_Part], samples: Sequence[Samples], columns: Columns, named: bool
+    path: Path,
+    form: str,
+    parts: Sequence[_Part],
+    samples: Sequence[Samples],
+    columns: Columns,
+    named: bool,
+    lines: bool,
 ) -> None:
     """Write the table of some curves, in the order of their rows, with a column of their names if ``named`` is True."""
     pairs: list[tuple[str, Any]] = [(columns.time, np.concatenate([part.times for part in parts]))]
@@ -231,7 +278,7 @@ def _write(
     rows = [part.rows for part in parts if part.rows is not None]
     order = np.argsort(np.concatenate(rows)) if rows else slice(None)
     lonlat = tuple(columns.points) if columns.lonlat else None
-    layout = Layout(columns.time, columns.curve if named else None, lonlat, bool(columns.utc))
+    layout = Layout(columns.time, columns.curve if named else None, lonlat, bool(columns.utc), lines)
     write_table(path, form, {name: column[order] for name, column in pairs}, layout)
     tell(f"{called(path)}: {counted(len(pairs[0][1]), 'row')}")
 

@@ -16,7 +16,7 @@ from datetime import UTC
 from decimal import Decimal, InvalidOperation
 from email.utils import parsedate_to_datetime
 from importlib import import_module
-from itertools import chain, count, islice
+from itertools import chain, count, islice, pairwise
 from pathlib import Path, PurePath
 from typing import Any, BinaryIO, NamedTuple
 
@@ -483,12 +483,15 @@ class Layout(NamedTuple):
         Columns of longitude and latitude in degrees, and perhaps of the height.
     utc : bool
         Whether dates are in UTC.
+    lines : bool
+        Whether GeoJSON has one line per curve instead of points.
     """
 
     time: str
     curve: str | None
     lonlat: tuple[str, ...] | None
     utc: bool
+    lines: bool = False
 
 
 # ---- CSV ----
@@ -954,17 +957,40 @@ def _write_json_lines(file: BinaryIO, columns: Mapping[str, Array], layout: Layo
 
 
 def _write_geojson(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
-    """Write a collection of points, one per row and line, whose other columns are properties."""
+    """Write a collection of points, one per row and line, whose other columns are properties, or of lines."""
     names = _lonlat(columns, layout, "GeoJSON")
     values = _lists(columns, layout)
-    places = zip(*map(values.pop, names), strict=True)
-    features = []
-    for place, *others in zip(places, *values.values(), strict=True):
+    places = list(zip(*map(values.pop, names), strict=True))
+    features = [json.dumps(line) for line in _lines(places, values, layout)] if layout.lines else []
+    for place, *others in zip(places, *values.values(), strict=True) if not layout.lines else ():
         geometry = {"type": "Point", "coordinates": place}
         properties = dict(zip(values, others, strict=True))
         features.append(json.dumps({"type": "Feature", "properties": properties, "geometry": geometry}))
     collection = ",\n".join(features)
     file.write(f'{{"type": "FeatureCollection", "features": [\n{collection}\n]}}\n'.encode())
+
+
+def _lines(places: list[Any], values: Mapping[str, list[Any]], layout: Layout) -> list[dict[str, Any]]:
+    """Return one line per curve with its times and other columns as lists, cut where it crosses the date line."""
+    labels = [""] * len(places) if layout.curve is None else values[layout.curve]
+    features = []
+    for label in dict.fromkeys(labels):
+        rows = [row for row, name in enumerate(labels) if name == label]
+        cuts = [i + 1 for i in range(len(rows) - 1) if abs(places[rows[i]][0] - places[rows[i + 1]][0]) > 180]
+        parts = [rows[start:end] for start, end in pairwise([0, *cuts, len(rows)])]
+
+        def of(column: Sequence[Any], parts: Sequence[Sequence[int]] = parts) -> Any:
+            lists = [[column[row] for row in part] for part in parts]
+            return lists[0] if len(lists) == 1 else lists
+
+        properties: dict[str, Any] = {} if layout.curve is None else {"name": label}
+        properties[_LINE_TIMES[0]] = of(values[layout.time])
+        others = [name for name in values if name not in (layout.time, layout.curve)]
+        properties |= {name: of(values[name]) for name in others}
+        kind = _LINES[len(parts) > 1]
+        geometry = {"type": kind, "coordinates": of(places)}
+        features.append({"type": "Feature", "properties": properties, "geometry": geometry})
+    return features
 
 
 def _lonlat(columns: Mapping[str, Array], layout: Layout, what: str) -> tuple[str, ...]:
