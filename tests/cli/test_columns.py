@@ -194,3 +194,16 @@ def test_quaternions_of_opposite_sign_are_noted(capsys):
         assert f"the point in line {lines[0]} and the point in line {lines[1]}{of} have inner product -0.8" in note
         assert "For rotations give --space so:3, or rp:3, where signs do not count\n" in note
         assert "UserWarning" not in note and "symspline.rotations" not in note
+
+
+def test_inaccurate_points_are_projected_on_request(run, fails):
+    write("a.csv", "t,x,y,z\n0,1,0,0\n1,0.7,0.7,0\n2,0,1,0.01\n")
+    problem = fails("fit a.csv --space s:2 -o a.npz")
+    advice = problem.rpartition("; ")[2]
+    assert "line 3 is off the space by 1.005e-2" in problem and advice.endswith("points that are only inaccurate")
+    run(f"fit a.csv --space s:2 {' '.join(advice.split()[:2])} -o a.npz")
+    points = np.array([[1, 0, 0], [0.7, 0.7, 0], [0, 1, 0.01]])
+    np.testing.assert_allclose(ss.load("a.npz").points, points / np.linalg.norm(points, axis=1, keepdims=True))
+    write("b.csv", "t,x,y,z\n0,1,0,0\n1,70,70,0\n")
+    assert "--atol" not in fails("fit b.csv --space s:2 -o b.npz")
+    assert "give a number between 0 and 1" in fails("fit a.csv --space s:2 --atol 2 -o b.npz")

@@ -214,3 +214,23 @@ def test_tum_of_curves_from_matrices_and_dates(run):
     run("sample a.npz --at t.csv -o a.tum")
     lines = Path("a.tum").read_text().splitlines()
     assert lines[1].split()[0] == "1630195200.000000000" and lines[2].split()[0] == "1630195201.000000007"
+
+
+def test_quaternions_that_are_missing_or_inaccurate(run, fails):
+    turn = np.sqrt([0.98, 0.02])
+    missing = "2,1,2,3,nan,nan,nan,nan\n"
+    text = f"t,x,y,z,qw,qx,qy,qz\n0,1,2,3,1,0,0,0\n1,1,2,3,0,0,0,0\n{missing}3,1,2,3,{turn[0]},0,0,{turn[1]}\n"
+    write("a.csv", text)
+    problem = fails("fit a.csv --space 'so:3 x r:3' -o a.npz")
+    assert problem.startswith("a.csv, line 4: column 'qw' is empty or NaN; symspline fit --skipna")
+    out = run("fit a.csv --space 'so:3 x r:3' --skipna -o a.npz")
+    assert "2 rows without a point or a time omitted (--skipna)" in out
+    assert ss.load("a.npz").t.tolist() == [0, 3]
+    write("b.csv", text.replace(missing, ""))
+    problem = fails("fit b.csv --space 'so:3 x r:3' -o b.npz")
+    assert "b.csv, line 3: the quaternion has length 0, not 1" in problem and "--skipna omits" in problem
+    write("c.csv", "t,qw,qx,qy,qz\n0,1.02,0,0,0\n1,0.776,0.582,0,0\n")
+    assert "--atol 0.1 normalises quaternions" in fails("fit c.csv --space so:3 -o c.npz")
+    run("fit c.csv --space so:3 --atol 0.1 -o c.npz")
+    turned = [[1, 0, 0], [0, 0.28, -0.96], [0, 0.96, 0.28]]
+    np.testing.assert_allclose(ss.load("c.npz").points, [np.eye(3), turned], atol=1e-15)

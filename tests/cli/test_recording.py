@@ -64,7 +64,7 @@ def test_rows_with_empty_cells_are_omitted_on_request(ending, run, fails):
     problem = fails(f"fit a.{ending} --space r:1 --columns x -o b.npz")
     assert "symspline fit --skipna omits such rows" in problem
     out = run(f"fit a.{ending} --space r:1 --columns x --skipna -o b.npz")
-    assert f"; {4 if ending == 'csv' else 2} rows with empty cells omitted (--skipna)" in out
+    assert f"; {4 if ending == 'csv' else 2} rows without a point or a time omitted (--skipna)" in out
     assert ss.load("b.npz") == through([0, 5, 6], [1, 9, 4])
     write("a.csv", "t,x\n0,\n1,\n")
     problem = fails("fit a.csv --space r:1 --columns x --skipna -o c.npz")
@@ -75,7 +75,7 @@ def test_poses_that_are_not_known_are_omitted_from_a_trajectory(run, fails):
     write("a.txt", "0 0 0 0 0 0 0 1\n1 1 0 0 nan nan nan nan\n2 2 0 0 0 0 0 1\n3 3 1 0 0 0 0 1\n")
     problem = fails("fit a.txt --space se:3 -o a.npz")
     assert problem == "a.txt, line 2: column 'qx' is empty or NaN; symspline fit --skipna omits such rows"
-    assert "; 1 row with empty cells omitted" in run("fit a.txt --space se:3 --skipna -o a.npz")
+    assert "; 1 row without a point or a time omitted" in run("fit a.txt --space se:3 --skipna -o a.npz")
     np.testing.assert_array_equal(ss.load("a.npz").t, [0, 2, 3])
     write("a.txt", "0 0 0 0 0 0 0 1\n1 1 0 0 inf 0 0 0\n")
     assert "line 2: column 'qx' holds inf" in fails("fit a.txt --space se:3 --skipna -o b.npz")

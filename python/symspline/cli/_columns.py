@@ -41,6 +41,10 @@ _LARGEST = {"longitude": 360, "latitude": 90}
 _IN_BRACKETS = re.compile(r"[(\[].*?[)\]]")
 # Everything except the unit in names such as heading_deg or "heading (deg)".
 _UNIT = re.compile(r".*[\[(_ ]|[\])]")
+_NORMALISE = "; --atol 0.1 normalises quaternions that are only inaccurate, and --skipna omits those that are zero"
+_OFF = re.compile(r"off the space by ([\d.e+-]+)")
+_INACCURATE = 0.5
+"""Distance from a space up to which points may be inaccurate and not wrong."""
 _DEGREES = re.compile(r"[ _.-]*(degs?|degrees?|°)$")
 
 # Names of times without blanks and marks: "BaseDateTime", "#timestamp [ns]", "ISO_TIME", "header.stamp".
@@ -447,6 +451,8 @@ class PointColumns:
         The column of each number of a point whose rotation is a quaternion, as in `Columns`.
     degrees : bool or None
         Whether angles of tori are in degrees. None if the user did not say so.
+    atol : float or None
+        Distance from the space within which points are projected. None for the usual one.
     """
 
     path: Source
@@ -455,6 +461,7 @@ class PointColumns:
     lonlat: bool
     quaternion: list[int] | None
     degrees: bool | None = None
+    atol: float | None = None
 
     @property
     def names(self) -> list[str]:
@@ -465,6 +472,13 @@ class PointColumns:
     def used(self) -> list[str]:
         """All columns."""
         return [column for _, *columns in self.entries for column in columns]
+
+    def are_zero(self, table: Table) -> NDArray[np.bool_]:
+        """Return the rows of a table whose quaternion is zero, as some programs mark missing rotations."""
+        ends = np.cumsum([width(factor, True) for factor in factors_of(self.space)])
+        turned = [end for end, factor in zip(ends, factors_of(self.space), strict=True) if factor in (ROTATIONS, POSES)]
+        columns = [self.used[i] for i in (self.quaternion or [])[turned[0] - 4 : turned[0]]]
+        return np.asarray(np.all([table.numbers(name) == 0 for name in columns], axis=0))
 
     def read(self, numbers: Doubles, place: Place) -> Any:
         """Return the points in rows of these columns, projected onto the space if they are off it by rounding only.
@@ -490,7 +504,7 @@ class PointColumns:
         for factor, start, end in zip(factors, ends, ends[1:], strict=False):
             columns = np.ascontiguousarray(numbers[:, start:end])
             if self.quaternion and factor in (ROTATIONS, POSES):
-                rotations = rotations_in_rows(columns[:, -4:], self.path, place)
+                rotations = rotations_in_rows(columns[:, -4:], self.path, place, self.atol, _NORMALISE)
                 part = join(rotations, columns[:, :3]) if factor == POSES else rotations
             else:
                 part = columns.view(factor.dtype).reshape(len(columns), *factor.point_shape)
@@ -523,12 +537,16 @@ class PointColumns:
         doubles = factor._doubles(points, "points")
         lead = factor._lead(doubles)
         try:
-            factor._handle.check_points(factor._rows(doubles, lead), lead, factor._tol(points))
+            factor._handle.check_points(factor._rows(doubles, lead), lead, self.atol or factor._tol(points))
         except ValidationError as error:
             row, _, problem = for_command_line(error).removeprefix("point ").partition(" ")
             of = f"the part in {factor} of " if isinstance(self.space, Product) else ""
             order = f"; the columns of the table are a {_matrix(factor)}" if _is_matrix(factor) else ""
-            raise Problem(f"{self.path}: {of}the point in {place(int(row))} {problem}{order}") from None
+            # The distance is rounded in the message.
+            far = _OFF.search(problem)
+            off = float(f"{1.05 * float(far[1]):.1e}") if far else 1.0
+            advice = f"; --atol {off:g} projects points that are only inaccurate" if off <= _INACCURATE else ""
+            raise Problem(f"{self.path}: {of}the point in {place(int(row))} {problem}{order}{advice}") from None
         return factor.project(points)
 
 

@@ -152,6 +152,10 @@ _TIME = (
     "column of times, none for 0, 1, 2, ..., or two columns with a comma: whole seconds and nanoseconds since 1970, or "
     "a date and a time of day; see above for the default"
 )
+_ATOL = (
+    "project points onto the space, and normalise quaternions, if they are at most this far off (default: as far as "
+    "their decimals allow)"
+)
 _TIME_FORMAT = "format of dates that are not in ISO 8601, such as '%%d.%%m.%%Y %%H:%%M', as for strptime; %%z is a zone"
 _FOR_ROTATIONS = "For rotations give --space so:3, or rp:3, where signs do not count"
 # Options of the library for curves through points and for curves near them.
@@ -186,7 +190,9 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
     unit("--radians", dest="degrees", action="store_const", const=False, help=radians)
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
-    add("--skipna", action="store_true", help="omit rows without a point or a time: empty cells, NaN, NA or null")
+    skipna = "omit rows without a point or a time: empty cells, NaN, NA or null, quaternions of zeros"
+    add("--skipna", action="store_true", help=skipna)
+    add("--atol", type=_tolerance, metavar="D", help=_ATOL)
     add("--na", type=split_names, metavar="W,...", help="further texts or numbers of missing values, such as -999")
     add("--dedup", choices=("first", "mean"), help="keep the first of the points of one time, or their mean")
     add("--max-gap", metavar="DT", help=_MAX_GAP)
@@ -203,6 +209,12 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
     robust = "reduce the influence of outliers (loss 'cauchy')"
     add("--robust", dest="loss", action="store_const", const="cauchy", help=robust)
     add("--penalty", choices=("acceleration", "jerk"), help="derivative that is kept small (default: acceleration)")
+
+
+def _tolerance(text: str) -> float:
+    if not (is_number(text) and 0 < float(text) < 1):
+        raise argparse.ArgumentTypeError(f"{text}: give a number between 0 and 1, such as 0.01")
+    return float(text)
 
 
 def _numbers(text: str) -> Any:
@@ -354,9 +366,11 @@ def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Reco
     given = split_names(options.columns)
     time = time_column(table, time, [curve, *given], options.unix is not None or options.time_format)
     points = point_columns(table, given, [time, curve], space, options.lonlat, options.quaternion)
-    points = replace(points, degrees=options.degrees)
+    points = replace(points, degrees=options.degrees, atol=options.atol)
     needed = [*points.used, *filter(None, [time, curve])]
     table = table.without_empty(needed) if options.skipna else table
+    if options.skipna and points.quaternion:
+        table = table.rows_where(~points.are_zero(table))
     rows = table.read(points.used, time, curve, options.unix)
     check_days(table, time, rows)
     at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
@@ -575,7 +589,7 @@ class Recordings:
         dedup = self._options.dedup
         same = "merged with others of the same time" if dedup == "mean" else "omitted after another of their time"
         counts = (
-            (self.empty, "with empty cells omitted (--skipna)"),
+            (self.empty, "without a point or a time omitted (--skipna)"),
             (self.merged, f"{same} (--dedup {dedup})"),
             (self.alone, "alone between gaps omitted"),
         )

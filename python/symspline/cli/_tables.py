@@ -247,8 +247,13 @@ class Table:
 
     def without_empty(self, names: Sequence[str]) -> Table:
         """Return the rows in which none of these columns is missing."""
-        kept = np.flatnonzero(~np.any([self.missing(name) for name in names], axis=0))
-        refuse(self.path, (not kept.size, f" has no row in which {' and '.join(names)} are all given"))
+        kept = ~np.any([self.missing(name) for name in names], axis=0)
+        refuse(self.path, (not kept.any(), f" has no row in which {' and '.join(names)} are all given"))
+        return self.rows_where(kept)
+
+    def rows_where(self, mask: NDArray[np.bool_]) -> Table:
+        """Return the rows at which a mask is True."""
+        kept = np.flatnonzero(mask)
         columns = {name: column.take(kept) for name, column in self.columns.items()}
         place, texts = self.place, self.texts
         left = None if texts is None else lambda name: np.array(texts(name), object)[kept].tolist()

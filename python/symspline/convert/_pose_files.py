@@ -529,14 +529,16 @@ class Lines(NamedTuple):
         return ValidationError(f"{self.file}, {self.place(row)}: {problem}")
 
 
-def rotations_in_rows(q: Doubles, file: object, place: Callable[[int], str]) -> Array:
+def rotations_in_rows(
+    q: Doubles, file: object, place: Callable[[int], str], atol: float | None = None, advice: str = ""
+) -> Array:
     """Return the rotations of rounded quaternions, scalar first; `place` names the line of a row in messages."""
     sizes = length(q)
-    bad = np.flatnonzero(~(np.abs(sizes - 1) <= point_tol(q, 4)))
+    bad = np.flatnonzero(~(np.abs(sizes - 1) <= (point_tol(q, 4) if atol is None else atol)))
     if len(bad):
         raise ValidationError(
             f"{file}, {place(bad[0])}: the quaternion has length {sizes[bad[0]]:.6g}, not 1: are the columns in "
-            "another order?"
+            f"another order?{advice}"
         )
     return quaternion_to_matrix(q / sizes[:, None], scalar_first=True)
 
