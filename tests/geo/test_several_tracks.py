@@ -85,3 +85,10 @@ def test_other_columns_are_not_angles():
     assert resampled(track("A", 10.0, 50.0, course=far), "10min", interpolate="course")[0].course[1] == pytest.approx(
         1755
     )
+
+
+def test_a_second_track_on_one_globe_names_the_function():
+    track = ss.CubicSpline(None, ss.geo.from_lonlat([0, 10, 20], [40, 45, 40]), "sphere:2")
+    axes = ss.geo.plot(track).axes[0]
+    with pytest.raises(ss.ValidationError, match=r"symspline\.geo\.plot\(\[first, second\], ax=ax\)"):
+        ss.geo.plot(track, ax=axes)

@@ -246,9 +246,10 @@ def _draw_into(ax: Axes, curves: Sequence[Curve], title: str | None = None, show
     if ax.has_data() and (view.is_turned or view.in_rows):
         why = "symbols of several curves would overlap"
         why = "the view of this picture depends on the curves" if view.is_turned else why
+        function = "symspline.plot" if curves[0].radius is None else "symspline.geo.plot"
         raise ValidationError(
             f"ax already contains a picture, and {why}. Draw all of them in one call: "
-            "symspline.plot([first, second], ax=ax)."
+            f"{function}([first, second], ax=ax)."
         )
     return draw_picture_into(ax, view.projection, lambda panel: view.draw_into(panel, curves), title, show)
 
