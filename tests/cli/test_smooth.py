@@ -279,3 +279,31 @@ def test_constant_smoothness_is_the_default(run):
     out = run("fit a.csv --lonlat --smooth -o a.npz")
     for line in ("--smooth a.csv", "a.csv --smooth constant --noise constant", "--smooth -- a.csv"):
         assert run(f"fit --lonlat -o a.npz {line}") == out
+
+
+def test_ends_of_exact_data_are_no_outliers(run):
+    """Natural ends bind the curve, which misses the data there by many times the other residuals."""
+    t = np.arange(60)
+    write_table("a.csv", {"t": t, "lon": np.round(t / 2, 4), "lat": np.round(30 * np.sin(t / 10), 4)})
+    assert "outlier" not in run("fit a.csv --lonlat --smooth -o a.npz")
+
+
+@pytest.mark.parametrize("line", ["", "--smooth"])
+def test_two_outliers_beside_each_other_are_found(run, line):
+    t = np.arange(200)
+    x = np.sin(t / 15) + 0.02 * np.random.default_rng(0).standard_normal(200)
+    x[80:82] += 1.0
+    write_table("a.csv", {"t": t, "x": x})
+    out = run(f"fit a.csv --space r:1 {line} -o a.npz", notes=True)
+    assert "line 82: " in out or "line 83: " in out
+    assert "the point is probably an outlier (and in 1 other row)" in out
+
+
+def test_an_outlier_that_pulls_the_curve_is_found(run):
+    """Between two gaps the curve follows a datum, whose residual is small."""
+    t = np.r_[np.arange(40), 42, 45 + np.arange(40)]
+    x = np.sin(t / 9) + 0.01 * np.random.default_rng(1).standard_normal(81)
+    x[40] += 0.4
+    write_table("a.csv", {"t": t, "x": x})
+    out = run("fit a.csv --space r:1 --smooth -o a.npz", notes=True)
+    assert "line 42: the point is probably an outlier, " in out

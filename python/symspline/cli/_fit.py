@@ -54,7 +54,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 
 from .._base.exceptions import SymsplineError
 from .._base.time import NANOSECONDS, time_axis_of
@@ -415,6 +416,10 @@ _FAST, _FAR = 10.0, 10.0
 """Multiples of the median speed and of the median distance from a smooth curve that outliers exceed."""
 _ROUNDING = 1e-9
 """Distances that are a smaller part of the largest component of a point are rounding errors."""
+_LEVERAGE = 0.9
+"""Largest leverage that counts. Beside a gap it is nearly 1, and a bias of the curve would be magnified."""
+_BOUND, _MOST_BOUND = 3.0, 5
+"""Data that natural ends bind, in data per degree of freedom, and their largest number at an end."""
 _FEWEST = 8
 """The smallest number of points of a curve that is searched for outliers."""
 
@@ -636,15 +641,17 @@ def outliers(data: Recordings, curves: Sequence[CubicSpline] | None, columns: Co
             continue
         # Not all spaces have distances between all points.
         with suppress(SymsplineError):
-            near = None if smooth is None else smooth[i](times)
             several = isinstance(data.space, Product)
             parts = points if several else (points,)
-            beside = [None] * len(parts) if near is None else near if several else (near,)
-            noise = [None] * len(parts) if smooth is None else _relative_noise(smooth[i], times)
-            for space, part, curve, sigma in zip(factors_of(data.space), parts, beside, noise, strict=True):
-                far, sizes, usual = _spikes(space, times, part) if curve is None else _far(space, part, curve, sigma)
+            beside = [None] * len(parts) if smooth is None else _deleted(smooth[i], times, parts)
+            for space, part, deviations in zip(factors_of(data.space), parts, beside, strict=True):
+                far, sizes, usual = _spikes(space, times, part)
+                if deviations is not None:
+                    far, sizes, usual = _far(far, *deviations, float(_ROUNDING * np.abs(part).max()))
                 by_angle = in_degrees(space, columns.lonlat, columns.degrees)
-                spikes += [(int(index[k]), float(sizes[k]), usual, by_angle) for k in np.flatnonzero(far)]
+                # The largest one is the least doubtful.
+                order = sorted(np.flatnonzero(far), key=lambda k: -sizes[k])
+                spikes += [(int(index[k]), float(sizes[k]), usual, by_angle) for k in order]
     if not spikes:
         return ""
     row, *lengths, degrees = spikes[0]
@@ -668,11 +675,18 @@ def _spikes(space: Space, times: Any, points: Any) -> tuple[NDArray[np.bool_], D
     if not lengths.min(initial=1.0) > 0:
         return is_spike, is_spike.astype(np.float64), 0.0
     speeds = steps / lengths
-    sizes, slowest = (np.r_[0.0, np.minimum(both[1:], both[:-1]), 0.0] for both in (steps, speeds))
     usual = float(np.median(speeds))
-    fast = np.flatnonzero((slowest > _FAST * usual) & (usual > 0))
-    around = space.distance(points[fast + 1], points[fast - 1])
-    is_spike[fast] = sizes[fast] > np.maximum(around, _ROUNDING * np.abs(points).max())
+    sizes = np.r_[0.0, np.minimum(steps[1:], steps[:-1]), 0.0]
+    fast, rounding = (speeds > _FAST * usual) & (usual > 0), _ROUNDING * np.abs(points).max()
+    # One point, and two neighbours, that are away from the points before and after them.
+    for count in (1, 2):
+        first = 1 + np.flatnonzero(fast[:-count] & fast[count:])
+        around = space.distance(points[first + count], points[first - 1])
+        away = np.minimum(steps[first - 1], steps[first + count - 1])
+        for k in range(count):
+            found = first[away > np.maximum(around, rounding)] + k
+            is_spike[found] = True
+            sizes[found] = np.maximum(sizes[found], away[away > np.maximum(around, rounding)])
     return is_spike, sizes, float(np.median(steps))
 
 
@@ -685,16 +699,56 @@ def _lengths_of(times: Any, count: int) -> Doubles:
     return np.asarray(np.maximum(lengths, 1e-3 * lengths.mean()))
 
 
-def _relative_noise(curve: SmoothingSpline[Any, Any], times: Any) -> list[Any]:
-    """Return the standard deviation of the noise in every factor, relative to its mean; 1 for poses."""
+_Deviations = tuple[Doubles, Doubles]
+
+
+def _deleted(curve: SmoothingSpline[Any, Any], times: Any, parts: Sequence[Any]) -> list[_Deviations]:
+    """Return the distances of data from a curve, and from the curve without them in standard deviations.
+
+    A deleted residual is r / (1 - h) with the leverage h (Cook and Weisberg, Residuals and influence in regression,
+    1982, §2.2). Its standard deviation is σ / √(1 - h). The variance of the curve at a datum is h σ². Distances of
+    poses, which mix two units, are returned as they are.
+    """
     several = is_several(curve.space)
-    varying, mean = (value if several else (value,) for value in (curve.sigma_at(times), curve.sigma))
-    relative = [at / sigma if sigma > 0 else 1.0 for at, sigma in zip(varying, mean, strict=True)]
-    return [of_factor[0] if len(of_factor) == 1 else 1.0 for of_factor in grouped(curve.space, relative)]
+    std, near, varying, mean = curve.std(times), curve(times), curve.sigma_at(times), curve.sigma
+    groups = [grouped(curve.space, value if several else (value,)) for value in (std, varying, mean)]
+    near = near if isinstance(curve.space, Product) else (near,)
+    deviations = []
+    for space, part, at, *noise in zip(factors_of(curve.space), parts, near, *groups, strict=True):
+        distances = np.asarray(space.distance(part, at))
+        if len(noise[0]) > 1 or not noise[2][0] > 0:
+            deviations.append((distances, distances))
+            continue
+        spread, sigma, level = (np.asarray(value[0]) for value in noise)
+        leverage = np.minimum((spread / sigma) ** 2, _LEVERAGE)
+        deviations.append((distances, distances / np.sqrt(1 - leverage) * level / sigma))
+    ends = _end_of(curve)
+    for _, deleted in deviations:
+        # Natural ends bind the curve, which misses exact data there.
+        deleted[:ends] = np.minimum(deleted[:ends], np.median(deleted))
+        deleted[len(deleted) - ends :] = np.minimum(deleted[len(deleted) - ends :], np.median(deleted))
+    return deviations
 
 
-def _far(space: Space, points: ArrayLike, near: Any, noise: Any) -> tuple[NDArray[np.bool_], Doubles, float]:
-    """Return which points are far from a curve, their distances, and the distance within which most points are."""
-    distances = np.asarray(space.distance(points, near))
-    farthest = np.maximum(_FAR * noise * np.median(distances / noise), _ROUNDING * np.abs(points).max())
-    return distances > farthest, distances, float(np.median(distances))
+def _end_of(curve: SmoothingSpline[Any, Any]) -> int:
+    """Return the number of data at an end that the end condition binds: a few per degree of freedom."""
+    if curve.bc_type != "natural":
+        return 0
+    fewest = min(float(part.report.df) for part in curve._smoothed)
+    count = len(curve.data[0])
+    return int(min(math.ceil(_BOUND * count / max(fewest, 1.0)), _MOST_BOUND, count // 4))
+
+
+def _far(
+    spikes: NDArray[np.bool_], distances: Doubles, deleted: Doubles, rounding: float
+) -> tuple[NDArray[np.bool_], Doubles, float]:
+    """Return which points are far from a curve, their distances, and the distance within which most points are.
+
+    Outliers pull the curve, which misses their neighbours.
+    """
+    usual = float(np.median(deleted))
+    far = (deleted > _FAR * usual) & (distances > rounding)
+    spikes = spikes & (deleted > _FAR / 2 * usual) & (distances > rounding)
+    beside = np.convolve(spikes, np.ones(5), "same") > 0
+    largest = sliding_window_view(np.pad(deleted, 2), 5).max(axis=1)
+    return spikes | (far & ~beside & (deleted == largest)), distances, float(np.median(distances))
