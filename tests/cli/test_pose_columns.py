@@ -234,3 +234,75 @@ def test_quaternions_that_are_missing_or_inaccurate(run, fails):
     run("fit c.csv --space so:3 --atol 0.1 -o c.npz")
     turned = [[1, 0, 0], [0, 0.28, -0.96], [0, 0.96, 0.28]]
     np.testing.assert_allclose(ss.load("c.npz").points, [np.eye(3), turned], atol=1e-15)
+
+
+@pytest.mark.parametrize("order", ["ZYX", "XYZ", "zyx", "ZXZ"])
+@pytest.mark.parametrize("degrees", [True, False])
+def test_euler_angles(run, order, degrees):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    angles = np.array([[10, 20, 30], [15, 25, 20], [20, 40, 0]]) * (1 if degrees else 0.01)
+    rows = [f"{i},{','.join(map(str, row))},{i},2,3\n" for i, row in enumerate(angles)]
+    write("a.csv", "t,a,b,c,x,y,z\n" + "".join(rows))
+    options = f"--euler {order} {'--degrees' if degrees else ''}"
+    run(f"fit a.csv --space so:3 --columns a,b,c {options} -o a.npz")
+    expected = rotation.from_euler(order, angles, degrees=degrees).as_matrix()
+    np.testing.assert_allclose(ss.load("a.npz").points, expected, atol=1e-14)
+    run(f"fit a.csv --space 'so:3 x r:3' {options} -o b.npz")
+    turned, moved = ss.load("b.npz").points
+    np.testing.assert_allclose(turned, expected, atol=1e-14)
+    np.testing.assert_array_equal(moved[:, 0], [0, 1, 2])
+
+
+def test_roll_pitch_and_yaw(run, fails):
+    rotation = pytest.importorskip("scipy.spatial.transform").Rotation
+    write("a.csv", "t,roll,pitch,yaw\n0,0,0,170\n1,1,2,179\n2,2,3,-172\n")
+    assert "--euler ZYX --degrees reads roll, pitch and yaw" in fails("fit a.csv --space so:3 -o a.npz")
+    run("fit a.csv --space so:3 --euler ZYX --degrees -o a.npz")
+    expected = rotation.from_euler("ZYX", [[170, 0, 0], [179, 2, 1], [-172, 3, 2]], degrees=True).as_matrix()
+    np.testing.assert_allclose(ss.load("a.npz").points, expected, atol=1e-14)
+    run("sample a.npz -n 3 -o b.csv")
+    assert list(table("b.csv")) == ["t", "qw", "qx", "qy", "qz"]
+    assert "--euler ZXZ does not suit the names" in fails("fit a.csv --space so:3 --euler ZXZ --degrees -o b.npz")
+
+
+def test_ground_truth_of_euroc(run):
+    head = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z [], v_x [m/s]"
+    write("a.csv", f"{head}\n1403636580838555648,1,2,3,1,0,0,0,9\n1403636580843555648,1,2,4,0.8,0,0,0.6,9\n")
+    run("fit a.csv -o a.npz")
+    curve = ss.load("a.npz")
+    assert str(curve.t[0]) == "2014-06-24T19:03:00.838555648"
+    np.testing.assert_array_equal(curve.points[1], [[1, 2, 3], [1, 2, 4]])
+
+
+def test_an_export_of_motive(run, fails):
+    above = "Format Version,1.23,Take Name,a\n\n,Type,Rigid Body,Rigid Body\n"
+    body, kinds = ",".join(["Drone"] * 8), ",".join(["Rotation"] * 4 + ["Position"] * 3 + ["Mean Marker Error"])
+    numbers = "0,0.0,0,0,0,1,5,0,0,0.1\n1,0.1,0,0,0.6,0.8,6,0,0,0.1\n"
+    write("a.csv", f"{above},Name,{body}\n,,{kinds}\nFrame,Time (Seconds),X,Y,Z,W,X,Y,Z,\n{numbers}")
+    run("fit a.csv -o a.npz")
+    curve = ss.load("a.npz")
+    assert str(curve.space) == "so:3 x euclidean:3" and curve.t.tolist() == [0, 0.1]
+    np.testing.assert_allclose(curve.points[0][1], [[0.28, -0.96, 0], [0.96, 0.28, 0], [0, 0, 1]], atol=1e-15)
+    write("b.csv", f"{above}Frame\n".replace("Frame", "0,1"))
+    assert "has a row of names that begins with Frame" in fails("fit b.csv --space r:1 -o b.npz")
+
+
+def test_poses_of_kitti(run, fails):
+    write("a.txt", "1 0 0 5 0 1 0 6 0 0 1 7\n0.28 -0.96 0 5 0.96 0.28 0 6 0 0 1 8\n")
+    assert fails("fit a.txt -o a.npz").endswith("; KITTI's poses have 12: give --from kitti")
+    run("fit a.txt --from kitti -o a.npz")
+    _, poses = ss.poses.read_kitti("a.txt")
+    turned, moved = ss.load("a.npz").points
+    np.testing.assert_allclose(turned, poses[:, :3, :3], atol=1e-15)
+    np.testing.assert_array_equal(moved, poses[:, :3, 3])
+    assert "KITTI's format has no times" in fails("sample a.npz -n 3 --to kitti -o b.txt")
+    write("b.txt", "1 0 0\n")
+    assert "has 12 numbers, not 3" in fails("fit b.txt --from kitti -o b.npz")
+
+
+def test_ticks_without_a_unit_are_noted(run):
+    write("a.csv", "timestamp,x\n112000000,0\n112010000,1\n112020000,2\n")
+    said = run("fit a.csv --space r:1 --time timestamp -o a.npz")
+    assert "if it counts us, also since a start, give --unix us, and rates are per second" in said
+    assert "give --unix" not in run("fit a.csv --space r:1 --unix us -o a.npz")
+    assert ss.load("a.npz")(ss.load("a.npz").t[0], nu=1) == pytest.approx(100)

@@ -430,6 +430,47 @@ def _quaternion_columns(names: list[str], space: Space, order: str | None) -> li
     return named or given or []
 
 
+# ---- Euler angles ----
+
+_ANGLES = {"roll": "X", "pitch": "Y", "yaw": "Z", "heading": "Z"}
+EULER = [first + second + third for first in "XYZ" for second in "XYZ" for third in "XYZ" if first != second != third]
+"""Orders of rotations about the axes of the body; those with lower-case letters are about fixed axes."""
+
+
+def with_quaternions(table: Table, order: str, given: list[str], others: Sequence[str | None], degrees: bool) -> Table:
+    """Return the table with a unit quaternion qw, qx, qy, qz in place of three Euler angles."""
+    names = [*map(table.require, given)] or [name for name in table.numeric if name not in others]
+    known = [name for name in names if _bare(name) in _ANGLES]
+    angles = known if len(known) == 3 else names[:3] if len(names) in (3, 6) else []
+    refuse(
+        table.path,
+        (not angles, f": --euler {order} needs three angles, and there are {listed(names)}; name them with --columns"),
+    )
+    if angles == known:
+        by_axis = {_ANGLES[_bare(name)]: name for name in known}
+        wrong = f"--euler {order} does not suit the names {listed(known)}"
+        refuse("", (sorted(by_axis) != sorted(order.upper()), wrong))
+        angles = [by_axis[axis] for axis in order.upper()]
+    total = np.eye(4)[[0] * table.height]
+    for axis, name in zip(order, angles, strict=True):
+        half = (np.radians(table.numbers(name)) if degrees else table.numbers(name)) / 2
+        turn = np.zeros((table.height, 4))
+        turn[:, 0], turn[:, 1 + "XYZ".index(axis.upper())] = np.cos(half), np.sin(half)
+        # Rotations about fixed axes are applied from the left.
+        total = _times(total, turn) if order.isupper() else _times(turn, total)
+    columns = {name: column for name, column in table.columns.items() if name not in angles}
+    return replace(table, columns=columns | dict(zip(QUATERNION, total.T, strict=True)))
+
+
+QUATERNION = ["qw", "qx", "qy", "qz"]
+
+
+def _times(p: Doubles, q: Doubles) -> Doubles:
+    """Multiply quaternions, scalar first."""
+    (a, u), (b, v) = ((x[:, :1], x[:, 1:]) for x in (p, q))
+    return np.concatenate([a * b - (u * v).sum(1, keepdims=True), a * v + b * u + np.cross(u, v)], axis=1)
+
+
 # ---- points ----
 
 Entry = tuple[str, ...]
@@ -664,6 +705,8 @@ def _check_count(
     symmetric = symmetric and 2 * len(entries) == space.point_shape[0] * (space.point_shape[0] + 1)
     advice = "" if given else "; say which with --columns, and --time if one holds the times"
     advice = "; name both sides of the matrix, such as --columns a,b,b,c for [[a, b], [b, c]]" if symmetric else advice
+    if sum(_bare(name) in _ANGLES for name, *_ in entries) == 3:
+        advice += "; --euler ZYX --degrees reads roll, pitch and yaw in degrees"
     known = {"", *table.numeric, *filter(None, others)}
     other = [name for name in table.names if name not in known]
     if other and not given:

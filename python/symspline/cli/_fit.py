@@ -70,9 +70,11 @@ from .._splines.cubic import CubicSpline
 from .._splines.functional import fit_many
 from ..geo import ZIGZAG
 from ._columns import (
+    EULER,
     GLOBE,
     JOINED,
     ORDERS,
+    QUATERNION,
     WITH_HEIGHT,
     Columns,
     PointColumns,
@@ -88,6 +90,7 @@ from ._columns import (
     split_names,
     suggested,
     time_column,
+    with_quaternions,
     with_stamps,
 )
 from ._curves import Curves, write_curves
@@ -153,6 +156,10 @@ _TIME = (
     "column of times, none for 0, 1, 2, ..., or two columns with a comma: whole seconds and nanoseconds since 1970, or "
     "a date and a time of day; see above for the default"
 )
+_EULER = (
+    "three angles are rotations of so:3 about the axes of the body in this order, or with lower-case letters about "
+    "fixed axes; columns roll, pitch and yaw are about x, y and z; in radians unless --degrees is given"
+)
 _ATOL = (
     "project points onto the space, and normalise quaternions, if they are at most this far off (default: as far as "
     "their decimals allow)"
@@ -190,6 +197,7 @@ def add_fit(parser: argparse.ArgumentParser) -> None:
     radians = "angles of torus:n are in radians, also those beyond two turns (4 pi), which are otherwise refused"
     unit("--radians", dest="degrees", action="store_const", const=False, help=radians)
     add("--quaternion", choices=ORDERS, help="order of a quaternion, if the names do not show it")
+    add("--euler", choices=EULER + [order.lower() for order in EULER], metavar="ZYX", help=_EULER)
     add("--sort", action="store_true", help="put the rows of every curve in the order of their times")
     skipna = "omit rows without a point or a time: empty cells, NaN, NA or null, quaternions of zeros"
     add("--skipna", action="store_true", help=skipna)
@@ -291,7 +299,7 @@ def _space(options: argparse.Namespace, table: Table) -> Space:
         )
     if options.lonlat:
         require_globe(space)
-    on_torus = any(isinstance(factor, Torus) for factor in factors_of(space))
+    on_torus = options.euler is not None or any(isinstance(factor, Torus) for factor in factors_of(space))
     flag = "--degrees" if options.degrees else "--radians"
     refuse(
         flag, (options.degrees is not None and not on_torus, f" is for torus:n and products with it, not for {space}")
@@ -366,6 +374,10 @@ def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Reco
     curve = table.require(options.curve) if options.curve is not None else None
     given = split_names(options.columns)
     time = time_column(table, time, [curve, *given], options.unix is not None or options.time_format)
+    if options.euler is not None:
+        table = with_quaternions(table, options.euler, given, [time, curve], bool(options.degrees))
+        given = [*(name for name in given if name in table.names), *QUATERNION] if given else []
+        given = given or [name for name in table.numeric if name not in (time, curve)]
     points = point_columns(table, given, [time, curve], space, options.lonlat, options.quaternion)
     points = replace(points, degrees=options.degrees, atol=options.atol)
     needed = [*points.used, *filter(None, [time, curve])]
@@ -374,6 +386,7 @@ def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Reco
         table = table.rows_where(~points.are_zero(table))
     rows = table.read(points.used, time, curve, options.unix)
     check_days(table, time, rows)
+    _note_on_units(table, time, rows)
     at = "times 0, 1, 2, ..." if time is None else f"times in column {time}"
     tell(f"{table.path}: {table.path.format} table, points in columns {listed(points.names)}, {at}", VERBOSE)
     data = Recordings(table, rows, time, points, options, whole.height - table.height)
@@ -381,6 +394,20 @@ def _read(options: argparse.Namespace, whole: Table, space: Space) -> tuple[Reco
     names = points.names, time or "time", curve or "curve"
     decimals = decimals_of(points.used, rows.numbers)
     return data, Columns(*names, options.lonlat, rows.utc, points.quaternion, cut, bool(options.degrees), decimals)
+
+
+def _note_on_units(table: Table, time: str | None, rows: Rows) -> None:
+    """Describe the unit that times without one probably have, such as microseconds since a computer was started."""
+    times = rows.times
+    if time is None or times.dtype.kind == "M" or len(times) < 2 or (times != np.floor(times)).any():
+        return
+    step = float(np.median(np.abs(np.diff(times.astype(np.float64)))))
+    if step >= _TICKS and "time" in time.lower():
+        unit = "ns" if step >= 1000 * _TICKS else "us"
+        tell(
+            f"{table.path}: most steps of column {time} are {step:g}; if it counts {unit}, also since a start, give "
+            f"--unix {unit}, and rates are per second"
+        )
 
 
 def _fitted(
@@ -410,6 +437,8 @@ def _fitted(
 
 Index = NDArray[np.int64]
 
+_TICKS = 1000
+"""Steps of whole numbers from which on they probably count microseconds or nanoseconds."""
 _JUMP = 30.0
 """Multiple of the median step and speed that a step from one track to another exceeds."""
 _FAST, _FAR = 10.0, 10.0

@@ -504,6 +504,12 @@ class Layout(NamedTuple):
 # The cells of a line ``sep=;``, with which Excel begins.
 _SEPARATOR = ["sep=", ""]
 _COMPLEX = re.compile(r"\(?[-+]?[\d.e]+([-+]?\d+)?([-+][\d.e]+([-+]\d+)?)?j\)?", re.ASCII)
+_MOTIVE = "Format Version"
+"""The first cell of an export of OptiTrack's Motive."""
+_OF_MOTIVE = [*(f"Rotation {axis}" for axis in "XYZW"), *(f"Position {axis}" for axis in "XYZ")]
+"""The columns of a pose in an export of one body."""
+_EUROC = [f"p_RS_R_{axis}" for axis in "xyz"] + [f"q_RS_{axis}" for axis in "wxyz"]
+"""The columns of a pose in the ground truth of the EuRoC data sets, without their units."""
 _WRITTEN = 50_000
 """Rows that are written between two updates of the progress."""
 
@@ -545,7 +551,7 @@ def _read_csv(path: Source) -> Table:
     def place(row: int) -> str:
         return f"line {next(islice(_rows(path, mark, head), row, None))[0]}"
 
-    return Table(path, columns, place, texts=texts, comma=mark == ";")
+    return _with_poses(Table(path, columns, place, texts=texts, comma=mark == ";"))
 
 
 class _Heading(NamedTuple):
@@ -572,6 +578,8 @@ def _heading(path: Source) -> _Heading:
         mark = " "
     comments: list[tuple[int, list[str]]] = []
     for _, number, cells in _rows(path, mark, 0, comments=True):
+        if cells[0] == _MOTIVE:
+            return _heading_of_motive(path)
         if cells[0].lstrip().startswith("#"):
             name = cells[0].lstrip("# ")
             comments.append((number, [name, *cells[1:]] if name else cells[1:]))
@@ -585,6 +593,35 @@ def _heading(path: Source) -> _Heading:
             skipped += [row - 1 for _, row, cells in below if cells[0].lstrip().startswith("#")]
         return _Heading(mark, number, [name.strip() for name in cells], skipped)
     return _Heading(mark, 0, [], [])
+
+
+def _heading_of_motive(path: Source) -> _Heading:
+    """Find the columns of an export of Motive, whose bodies, quantities and axes have one row each."""
+    above: list[list[str]] = []
+    for _, number, cells in _rows(path, ",", 0):
+        if cells[0] == "Frame":
+            bodies = next((row for row in above if row[1] == "Name"), [])
+            kinds = above[-1]
+            several = len(set(filter(None, bodies[2:]))) > 1
+            names = [
+                " ".join(filter(None, [body if several else "", kind, axis]))
+                for body, kind, axis in zip(bodies[2:], kinds[2:], cells[2:], strict=True)
+            ]
+            return _Heading(",", number, ["", "time", *names], list(range(number)))
+        above.append(cells)
+    raise Problem(f"{path}: an export of Motive has a row of names that begins with Frame; export it again as CSV")
+
+
+def _with_poses(table: Table) -> Table:
+    """Return a table of the EuRoC data sets or of Motive with its poses, and other tables as they are."""
+    if set(_OF_MOTIVE) <= {*table.names}:
+        return replace(table, groups={"points": _OF_MOTIVE}, holds="poses")
+    time, *pose = table.names[:8] or [""]
+    plain = [name.partition(" ")[0] for name in pose]
+    if not time.startswith("timestamp") or plain != _EUROC or table.columns[time].dtype.kind != "i":
+        return table
+    columns = {**table.columns, time: table.columns[time].astype("datetime64[ns]")}
+    return replace(table, columns=columns, is_utc={time: True}, groups={"points": pose}, holds="poses")
 
 
 def _converted(name: str, column: Any) -> dict[str, Array]:
@@ -789,7 +826,11 @@ def _read_tum(path: Source) -> Table:
         except UnicodeDecodeError:
             raise Problem(f"{path} is not text in UTF-8") from None
     text.name = str(path)
-    rows, lines = tum_rows(text, missing=True)
+    try:
+        rows, lines = tum_rows(text, missing=True)
+    except ValidationError as error:
+        kitti = "; KITTI's poses have 12: give --from kitti" if ": 12 numbers, but" in str(error) else ""
+        raise Problem(f"{error}{kitti}") from None
     return Table(path, dict(zip(TUM, rows.T, strict=True)), lines.place, holds="poses")
 
 
@@ -801,6 +842,33 @@ def _write_tum(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> 
     text = io.TextIOWrapper(file, "utf-8", newline="\n")
     write_tum_rows(text, time, np.stack(pose, axis=1), f"# timestamp {' '.join(TUM[1:])}")
     text.detach()
+
+
+# ---- KITTI ----
+
+_MATRIX = [
+    f"{name}{i}{j}" if name else f"t{'xyz'[i - 1]}"
+    for i in (1, 2, 3)
+    for name, j in (("r", 1), ("r", 2), ("r", 3), ("", 0))
+]
+
+
+def _read_kitti(path: Source) -> Table:
+    """Read poses of KITTI's odometry benchmark, lines with the twelve numbers of [R | x], without times."""
+    with path.open() as file:
+        try:
+            rows = np.loadtxt(file, ndmin=2)
+        except ValueError as error:
+            raise Problem(f"{path}: {error}") from None
+    refuse(path, (rows.shape[1] != 12, f": a line of KITTI's poses has 12 numbers, not {rows.shape[1]}"))
+    columns = dict(zip(_MATRIX, rows.T, strict=True))
+    # Rotations come before positions, as in so:3 x r:3.
+    names = sorted(columns, key=lambda name: name[0] == "t")
+    return Table(path, {name: columns[name] for name in names}, lambda row: f"line {row + 1}", holds="poses")
+
+
+def _write_kitti(file: BinaryIO, columns: Mapping[str, Array], layout: Layout) -> None:
+    raise Problem("KITTI's format has no times: write the poses as a TUM trajectory, .tum, or with symspline.poses")
 
 
 # ---- JSON and GeoJSON ----
@@ -1080,6 +1148,7 @@ _FORMATS = {
     "geojson": _Format(_read_geojson, _write_geojson, ("geojson",)),
     "gpx": _Format(_read_gpx, _write_gpx, ("gpx",)),
     "tum": _Format(_read_tum, _write_tum, ("tum", "txt")),
+    "kitti": _Format(_read_kitti, _write_kitti, ()),
 }
 TABLES = tuple(_FORMATS)
 CURVES = ("npz",)
