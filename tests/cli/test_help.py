@@ -21,9 +21,10 @@ def test_without_arguments_help_is_printed(capsys):
 def test_completion():
     pytest.importorskip("shtab")
     line = [sys.executable, "-m", "symspline", "--print-completion"]
-    for shell in ("bash", "zsh"):
+    for shell in ("bash", "zsh", "fish"):
         done = subprocess.run([*line, shell], capture_output=True, text=True, timeout=60)
-        assert (done.returncode, done.stderr) == (0, "") and "--max-gap" in done.stdout
+        assert (done.returncode, done.stderr) == (0, "") and "max-gap" in done.stdout
+        assert "sphere:2" in done.stdout.replace("\\:", ":") and "not-a-knot" in done.stdout
     script = subprocess.run([*line, "bash"], capture_output=True, text=True, timeout=60).stdout
     if os.path.exists("/bin/bash"):
         ask = "COMP_WORDS=(symspline fit --crit); COMP_CWORD=2; _shtab_symspline; echo ${COMPREPLY[@]}"
@@ -86,3 +87,31 @@ def test_info_of_the_installation(run):
     out = run("info")
     assert "  sphere:2: " in out and "  so:2: " in out and ".geojson" in out and "matplotlib" in out
     assert max(map(len, out.splitlines())) < 100
+
+
+@pytest.mark.parametrize("verb", ["fit", "sample", "resample", "plot", "check", "info"])
+def test_the_short_help_is_one_screen(capsys, verb, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main([verb, "-h"])
+    out = capsys.readouterr().out
+    lines = out.splitlines()
+    assert out.startswith(f"usage: symspline {verb} ") and "--help prints all options" in lines[-1]
+    assert len(lines) <= 32 and max(map(len, lines)) <= 100
+    with pytest.raises(SystemExit):
+        main([verb, "--help"])
+    whole = capsys.readouterr().out
+    # A usual option has its names in both.
+    assert len(whole) > len(out) and ("--method" in whole) == (verb in ("fit", "resample"))
+    assert "--method" not in out and "--tol" not in out
+    assert main(["help", verb]) == 0
+    assert capsys.readouterr().out == whole
+
+
+def test_help_and_version(capsys, fails):
+    assert main(["help"]) == 0
+    assert capsys.readouterr().out.startswith("usage: symspline")
+    assert "did you mean sample?" in fails("help sampel")
+    with pytest.raises(SystemExit):
+        main(["-V"])
+    assert capsys.readouterr().out.startswith("symspline ")

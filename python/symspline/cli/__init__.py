@@ -8,10 +8,10 @@ example:
   symspline resample track.csv --lonlat --every 10min -o smooth.csv
   symspline fit - --lonlat -o - < track.csv | symspline sample - -n 100 -o - | head
 
-See also `symspline VERB --help`, and `symspline info` for the spaces and formats of files. Exit codes: 0 success, 1 not
-converged or check failed, 2 invalid input or usage, 130 interrupted. Results go to standard output only for -o -;
-descriptions, warnings and errors go to standard error. An output file appears only when it is complete; a failed run
-leaves an older file unchanged.
+See also `symspline VERB -h` for the usual options, `symspline help VERB` for all, and `symspline info` for the spaces
+and formats of files. Exit codes: 0 success, 1 not converged or check failed, 2 invalid input or usage, 130 interrupted.
+Results go to standard output only for -o -; descriptions, warnings and errors go to standard error. An output file
+appears only when it is complete; a failed run leaves an older file unchanged.
 """
 
 from __future__ import annotations
@@ -22,14 +22,16 @@ import os
 import re
 import sys
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from difflib import get_close_matches
 from typing import Any, NoReturn
 
 from .._base import VERSION
 from .._base.exceptions import ConvergenceError, SymsplineError
 from .._base.typing import Keywords
+from .._spaces.base import CLASSES
 from . import _check, _fit, _info, _plot, _resample, _sample
+from ._info import name_of_example
 from ._messages import QUIET, USUAL, VERBOSE, Problem, for_command_line, printed_warnings, say, set_level
 
 __all__ = ["main"]
@@ -87,25 +89,50 @@ def _drop_output() -> None:
 
 def _parser() -> _Parser:
     parser = _Parser("symspline", **_texts_of(__doc__))
-    parser.add_argument("--version", action="version", version=f"symspline {VERSION}")
+    parser.add_argument("-h", "--help", action="help", help="print this text")
+    parser.add_argument("-V", "--version", action="version", version=f"symspline {VERSION}")
     _add_completion(parser)
     verbs = parser.add_subparsers(metavar="VERB")
     for verb in (_fit, _sample, _resample, _plot, _check, _info):
         texts = _texts_of(verb.__doc__)
         summary = texts["description"].partition("\n")[0]
         command = verbs.add_parser(verb.__name__.rpartition("._")[2], help=summary, **texts)
+        command.add_argument("-h", action=_ShortHelp, nargs=0, help="print the usual options")
+        command.add_argument("--help", action="help", help="print all options and details")
         verb.add_arguments(command)
         level = command.add_mutually_exclusive_group().add_argument
         quiet = "print only warnings and errors, besides results"
         level("-q", "--quiet", dest="level", action="store_const", const=QUIET, default=USUAL, help=quiet)
         level("-v", "--verbose", dest="level", action="store_const", const=VERBOSE, help="print more about the work")
         command.set_defaults(run=verb.run)
+    known = dict(verbs.choices)
+    about = verbs.add_parser("help", help="print all options and details of a verb", add_help=False)
+    about.add_argument("verb", nargs="?", choices=list(known), metavar="VERB")
+
+    def print_help(options: argparse.Namespace) -> int:
+        known.get(options.verb, parser).print_help()
+        return 0
+
+    about.set_defaults(run=print_help, level=USUAL)
     return parser
 
 
 # ---- help, suggestions and completion ----
 
-_SHELLS = ("bash", "zsh")
+_SHELLS = ("bash", "zsh", "fish")
+_USUAL = {
+    "fit": "--space --lonlat --degrees --time --columns --curve --skipna --max-gap --smooth --sigma --robust -o",
+    "sample": "--every -n --at --nu --curve --lines -o",
+    "resample": "--every -n --space --lonlat --time --columns --curve --skipna --max-gap --smooth -o",
+    "plot": "--curve --lonlat --title --size -o",
+    "check": "--curve",
+    "info": "--time",
+}
+"""The options in the short help of each verb, which is one screen."""
+_EXAMPLES = 4
+"""Lines of examples in a short help."""
+_CLAUSE = re.compile(r"[;:] ")
+"""The end of the first clause of a help text."""
 # The first column of a table in a help text, with the blanks after it.
 _TERM = re.compile(r" *\S+(?: \S+)* {2,}")
 
@@ -203,7 +230,32 @@ def _texts_of(doc: str | None) -> Keywords:
         "epilog": f"example{examples}",
         "formatter_class": _Formatter,
         "allow_abbrev": False,
+        "add_help": False,
     }
+
+
+class _ShortHelp(argparse.Action):
+    """Prints the summary, the usual options and the examples of a verb."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, namespace: object, value: Any, option: str | None = None
+    ) -> None:
+        verb = parser.prog.rpartition(" ")[2]
+        usual = [action for action in parser._actions if {*_USUAL[verb].split()} & {*action.option_strings}]
+        inputs = parser._get_positional_actions()
+        formatter = parser._get_formatter()
+        formatter.add_usage(f"{parser.prog} {' '.join(str(action.metavar) for action in inputs)} [options]", [], [])
+        formatter.add_text((parser.description or "").partition("\n")[0])
+        formatter.start_section("usual options")
+        for action in usual:
+            short = _CLAUSE.split(action.help or "")[0]
+            formatter.add_argument(argparse.Action(action.option_strings, "", action.nargs, help=short,
+                                                   metavar=action.metavar, choices=action.choices))  # fmt: skip
+        formatter.end_section()
+        formatter.add_text("\n".join((parser.epilog or "").partition("\n\n")[0].split("\n")[:_EXAMPLES]))
+        formatter.add_text(f"{parser.prog} --help prints all options and details.")
+        print(formatter.format_help(), end="")
+        parser.exit(0)
 
 
 class _Completion(argparse.Action):
@@ -216,8 +268,28 @@ class _Completion(argparse.Action):
             import shtab
         except ImportError:
             raise Problem("completion needs shtab; install it with: pip install 'symspline[completion]'") from None
+        if value not in shtab.SUPPORTED_SHELLS:
+            raise Problem(f"this version of shtab has no completion for {value}; update it: pip install -U shtab")
+        for verb in _actions_of(parser):
+            for action in verb:
+                # Words that are completed, but are not the only possible ones.
+                words = next((_WORDS[name]() for name in action.option_strings if name in _WORDS), None)
+                action.choices = words or action.choices
         print(shtab.complete(parser, value))
         parser.exit(0)
+
+
+_WORDS: dict[str, Callable[[], list[str]]] = {
+    "--space": lambda: [name_of_example(cls) for cls in CLASSES.values()],
+    "--bc-type": lambda: ["natural", "not-a-knot", "clamped", "periodic"],
+    "--method": lambda: ["auto", "quasi-newton", "newton", "homotopy", "fixed-point"],
+}
+
+
+def _actions_of(parser: argparse.ArgumentParser) -> list[list[argparse.Action]]:
+    """Return the actions of every verb."""
+    verbs = next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
+    return [verb._actions for verb in verbs.choices.values()]
 
 
 def _add_completion(parser: argparse.ArgumentParser) -> None:

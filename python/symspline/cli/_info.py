@@ -73,8 +73,13 @@ def run(options: argparse.Namespace) -> int:
     return 0
 
 
+def name_of_example(cls: Any) -> str:
+    """Return the name of a space of a class, such as sphere:2."""
+    return example_of(cls).rpartition("'")[0].rpartition("'")[2]
+
+
 def _installation() -> list[str]:
-    spaces = [(example_of(cls).rpartition("'")[0].rpartition("'")[2], cls) for cls in CLASSES.values()]
+    spaces = [(name_of_example(cls), cls) for cls in CLASSES.values()]
     lines = ["spaces, such as:"]
     lines += [f"  {name}: {(cls.__doc__ or '').partition(chr(10))[0]}" for name, cls in spaces]
     lines += ["formats of tables:", f"  {endings()}", "optional libraries:"]
