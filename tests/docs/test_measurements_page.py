@@ -14,6 +14,8 @@ def test_the_numbers_are_those_of_the_code():
     for block in blocks(PAGE):
         run(block, PAGE, names)
     assert f"curve.report.sigma  # {names['curve'].report.sigma:.2f}\n" in text
+    bias = names["bias"]
+    assert f"# ({', '.join(f'{value:.3f}' for value in bias.value)}), each ± {bias.std.max():.3f};" in text
     value, std, true = re.search(
         r"offset.std  # ([\d.]+) and ([\d.]+) seconds; the true offset is ([\d.]+)", text
     ).groups()
