@@ -526,7 +526,7 @@ def plot(
     color: str | tuple[float, ...] | Sequence[Any] | None = None,
     label: str | Sequence[str] | None = None,
     title: str | None = None,
-    figsize: tuple[float, float] | None = None,
+    figsize: tuple[float, float] | float | None = None,
     show: bool = False,
 ) -> Figure | Axes:
     """Plot a track, or several, on the Earth, with land, its speed in km/h and its acceleration.

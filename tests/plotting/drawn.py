@@ -1,7 +1,10 @@
 """Helpers that inspect figures."""
 
+from unittest import mock
+
 import matplotlib
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import symspline as ss
 
@@ -61,7 +64,8 @@ def dots_of(axes):
 
 def has_title(figure, kind, space):
     """Whether the title names the kind of curve and the space, and perhaps what its points are."""
-    return any(text.startswith(kind) and text.endswith((f" on {space!r}", f" on {space}")) for text in texts_of(figure))
+    name = str(space).replace("euclidean:", "r:").replace("hyperbolic:", "h:")
+    return any(text.startswith(kind) and text.endswith(f" on {name}") for text in texts_of(figure))
 
 
 def texts_of(figure):
@@ -79,3 +83,39 @@ def role(artist):
     """What the legend of a page says of an artist, without details."""
     label = str(artist.get_label()).removeprefix("_")
     return next((own for own in ROLES if label.startswith(own)), label)
+
+
+def drawn_texts(figure):
+    """All texts that are drawn, with their boxes in pixels and their sizes in points."""
+    seen, draw = [], matplotlib.text.Text.draw
+
+    def record(text, renderer):
+        if text.get_visible() and text.get_text().strip() and text.get_alpha() != 0:
+            seen.append((text.get_text(), text.get_window_extent(renderer), text.get_fontsize()))
+        return draw(text, renderer)
+
+    canvas = FigureCanvasAgg(figure)
+    # The first time, the layout is computed.
+    canvas.draw()
+    with mock.patch.object(matplotlib.text.Text, "draw", record):
+        canvas.draw()
+    return seen
+
+
+def faults_of_texts(figure, smallest=6.0):
+    """Texts that are too small, leave the figure or overlap others by more than half a point."""
+    texts, point = drawn_texts(figure), figure.dpi / 72
+    faults = [f"{text!r} has {size:.1f} points" for text, _, size in texts if size < smallest - 0.01]
+    width, height = figure.bbox.width + point, figure.bbox.height + point
+    faults += [
+        f"{text!r} leaves the figure"
+        for text, box, _ in texts
+        if min(box.x0, box.y0) < -point or box.x1 > width or box.y1 > height
+    ]
+    for i, (text, box, _) in enumerate(texts):
+        for other, beside, _ in texts[:i]:
+            across = min(box.x1, beside.x1) - max(box.x0, beside.x0)
+            along = min(box.y1, beside.y1) - max(box.y0, beside.y0)
+            if min(across, along) > 0.5 * point:
+                faults.append(f"{text!r} overlaps {other!r}")
+    return faults

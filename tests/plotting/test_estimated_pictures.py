@@ -1,4 +1,6 @@
-"""Pictures of estimated curves: points of all measurements, bands, and residuals of the others."""
+"""Pictures of estimated curves: points of all measurements, bands, constants and residuals."""
+
+import re
 
 import numpy as np
 import pytest
@@ -58,7 +60,15 @@ def test_residuals_and_band_of_rotations():
     assert "30 Points, 90 BodyRates, 20 knots" in " ".join(texts_of(figure))
     panel = axes_named(figure, "BodyRates")
     assert panel.get_ylabel() == "BodyRates\nresidual / σ"
-    assert [text.get_text() for text in panel.get_legend().get_texts()] == ["x", "y", "z"]
+    assert {"residual in x", "residual in y", "residual in z"} <= set(texts_of(figure))
+    # Points have residuals, too, and the constant is in the heading.
+    attitude = axes_named(figure, "Points")
+    np.testing.assert_allclose(dots(attitude)[:, 1], curve.residuals[0].T.ravel())
+    bias = curve.parameters["gyro bias"]
+    (words,) = [text for text in texts_of(figure) if "gyro bias" in text]
+    shown = re.search(r"gyro bias \((.*), (.*), (.*)\) ± ([\d.]+)", words.replace("\n", " "))
+    np.testing.assert_allclose([float(x) for x in shown.groups()[:3]], bias.value, atol=0.2 * bias.std.max())
+    assert float(shown[4]) == pytest.approx(bias.std.max(), rel=0.06)
     residuals = curve.residuals[1]
     np.testing.assert_allclose(dots(panel), np.column_stack([np.tile(S, 3), residuals.T.ravel()]))
     share = 100 * np.mean(np.abs(residuals) > 1.96)
@@ -96,7 +106,11 @@ def test_points_of_several_sensors_are_drawn():
     ]
     labels = [axes.get_ylabel() for axes in figure.axes]
     # The picture of the plane shows the band.
-    assert [label for label in labels if "residual" in label] == ["Velocities\nresidual / σ", "Function\nresidual / σ"]
+    assert [label.removesuffix("\nresidual / σ") for label in labels if "residual" in label] == [
+        *("Points 1", "Points 2", "Velocities", "Function")
+    ]
+    panel = axes_named(figure, "Points 2")
+    np.testing.assert_array_equal(np.unique(dots(panel)[:, 0]), S[weights > 0])
     assert not any("95 %" in label for label in labels)
 
 

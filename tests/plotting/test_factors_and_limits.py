@@ -7,20 +7,29 @@ from drawn import axes_named, rate_axes, rendered, role, texts_of
 import symspline as ss
 
 
-def test_angles_on_a_torus_have_no_jumps():
+def test_angles_on_a_torus_break_at_180_degrees():
     angles = np.column_stack([np.linspace(2, 9, 8), np.linspace(-1, 1, 8)])
     spline = ss.CubicSpline(None, (angles + np.pi) % (2 * np.pi) - np.pi, "torus:2")
     figure = rendered(spline.plot())
     axes = axes_named(figure, "angles, degrees")
-    for line, given in zip((own for own in axes.lines if own.get_gid() == "_curve"), angles.T, strict=True):
-        np.testing.assert_allclose(np.interp(np.arange(8), *line.get_data()), np.degrees(given), atol=1e-9)
-    for dots, given in zip((own for own in axes.lines if role(own) == "given points"), angles.T, strict=True):
-        np.testing.assert_allclose(dots.get_ydata(), np.degrees(given), atol=1e-9)
+    wrapped = (np.degrees(angles) + 180) % 360 - 180
+    for line, given in zip((own for own in axes.lines if own.get_gid() == "_curve"), wrapped.T, strict=True):
+        x, shown = line.get_data()
+        np.testing.assert_allclose(shown[np.searchsorted(x, np.arange(8))], given, atol=1e-9)
+        assert np.nanmax(np.abs(np.diff(shown))) < 5 and np.nanmax(np.abs(shown)) <= 180
+        assert np.isnan(shown).sum() == np.count_nonzero(np.abs(np.diff(given)) > 180)
+    for dots, given in zip((own for own in axes.lines if role(own) == "given points"), wrapped.T, strict=True):
+        np.testing.assert_allclose(dots.get_ydata(), given, atol=1e-9)
+    assert axes.get_yticks().tolist() == [-180, -90, 0, 90, 180]
+    rate = axes_named(figure, "speed")
+    assert rate.get_ylabel() == "speed\n|γ′|, °/t"
+    x, shown = next(own for own in rate.lines if own.get_gid() == "_curve").get_data()
+    np.testing.assert_allclose(shown, np.degrees(spline.speed(x)))
     # Data are close to the first curve, and the quantiles of a batch to its mean.
     t = np.array([1.3, 6.6])
     both = rendered(ss.plot([spline, (t, np.array([[3.4 - 2 * np.pi, -0.5], [8.4, 0.9]]))]))
     dots = next(line for line in axes_named(both, "x₁").lines if role(line) == "data")
-    np.testing.assert_allclose(dots.get_ydata(), np.degrees([3.4, 8.4]), atol=1e-9)
+    np.testing.assert_allclose(dots.get_ydata(), np.degrees([3.4 - 2 * np.pi, 8.4 - 2 * np.pi]), atol=1e-9)
     many = spline.space.exp(spline.points, np.linspace(-0.1, 0.1, 9)[:, None, None] * [1.0, 1.0])
     axes = axes_named(rendered(ss.CubicSpline(None, many, "torus:2").plot()), "x₁")
     (area,) = (own for own in axes.collections if role(own) == "5–95 %")
@@ -40,7 +49,7 @@ def test_limits_of_time_laws():
         for column in rate_axes(figure)
         for axes in column
     ]
-    assert found == [[0.75, -0.75], [], [], [0.5, -0.5]]
+    assert found == [[0.75, -0.75], [], [], [np.degrees(0.5), -np.degrees(0.5)]]
     assert "limit" in texts_of(figure)
     # Other laws are functions without limits.
     figure = path.retime(lambda x, nu: x if nu == 0 else (x * 0 + (nu == 1)), domain=(0.0, 2.0)).plot()

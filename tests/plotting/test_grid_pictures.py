@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from drawn import axes_named, has_title, rendered, texts_of
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.dates import date2num, num2date
 from matplotlib.figure import Figure
 from matplotlib.quiver import Quiver
@@ -34,19 +34,21 @@ def grid_on(name, points=None, axes=(U, V), **options):
 
 
 def image_of(figure, label="field"):
-    """The image of the picture with its pixels' coordinates, and values of shape (m, n)."""
+    """The image of the picture with its pixels' coordinates, and values of shape (m, n); axis 0 is vertical."""
     axes = axes_named(figure, label)
     (image,) = axes.images
     left, right, low, high = image.get_extent()
-    shown = image.get_array().swapaxes(0, 1)
+    shown = image.get_array()
     m, n = shown.shape[:2]
-    x, y = left + (right - left) * (np.arange(m) + 0.5) / m, low + (high - low) * (np.arange(n) + 0.5) / n
+    x, y = low + (high - low) * (np.arange(m) + 0.5) / m, left + (right - left) * (np.arange(n) + 0.5) / n
     return x, y, shown
 
 
 def nodes_of(figure, label="nodes"):
     (line,) = [line for axes in figure.axes for line in axes.lines if line.get_label() == label]
-    return line.get_xydata()
+    # In the order of the axes of the grid.
+    positions = line.get_xydata()[:, ::-1]
+    return positions[np.lexsort(positions.T[::-1])]
 
 
 @pytest.mark.parametrize("name", f"{SPACES} {OTHERS}".split()[::2])
@@ -103,7 +105,7 @@ def test_arrows_are_directions_over_the_polar_angle():
     np.testing.assert_allclose(shown, np.degrees(np.arccos(grid.grid(x, y)[..., 2])), atol=1e-6)
     (arrows,) = [each for each in axes_named(figure, "field").collections if isinstance(each, Quiver)]
     assert len(arrows.U) == 35
-    np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), grid(arrows.XY)[:, :2], atol=1e-9)
+    np.testing.assert_allclose(np.stack([arrows.U, arrows.V], axis=-1), grid(arrows.XY[:, ::-1])[:, :2], atol=1e-9)
     # States have the Bloch vector, whose third component is the difference of the probabilities.
     states = grid_on("cp:1")
     x, y, shown = image_of(states.plot())
@@ -116,7 +118,7 @@ def test_ellipses_are_those_of_the_tensors(name):
     grid = grid_on(name)
     figure = rendered(grid.plot())
     (ellipses,) = [each for each in axes_named(figure, "field").collections if isinstance(each, PolyCollection)]
-    tensors = grid(np.asarray(ellipses.get_offsets()))[:, :2, :2]
+    tensors = grid(np.asarray(ellipses.get_offsets())[:, ::-1])[:, :2, :2]
     rings = np.array([path.vertices[:97] for path in ellipses.get_paths()])
     solved = np.linalg.solve(tensors, rings.swapaxes(1, 2))
     np.testing.assert_allclose(np.sum(rings.swapaxes(1, 2) * solved, axis=1), 1, atol=1e-9)
@@ -166,8 +168,9 @@ def test_products_have_a_panel_per_factor():
     points = smooth_field("so:3"), smooth_field("r:3"), smooth_field("r:1")
     grid = ss.GridSpline((U, V), points, "so:3 x r:3 x r:1")
     figure = rendered(grid.plot())
-    title = "C² grid of rotations and vectors on SpecialOrthogonal(3) × Euclidean(3) × Euclidean(1)"
-    assert {"SpecialOrthogonal(3), rotations", "Euclidean(3), vectors", title} <= set(texts_of(figure))
+    title = "C² grid of rotations and vectors on so:3 x r:3 x r:1"
+    first_lines = {text.split("\n")[0] for text in texts_of(figure)}
+    assert {"so:3, rotations", "r:3, vectors", title} <= first_lines
     maps = [axes for axes in figure.axes if axes.get_label() == "field"]
     assert len(maps) == 2
     (image,) = maps[1].images
@@ -183,7 +186,8 @@ def test_further_axes_are_fixed_at_their_middle_nodes():
     x, y, z, s = np.meshgrid(U, V, w, np.arange(4.0), indexing="ij")
     grid = ss.GridSpline((U, V, w, days), (x * y + z + s**2)[..., None], "r:1")
     figure = rendered(grid.plot())
-    assert "axis 2 at 0.1235, axis 3 at 2024-03-01, 7 × 5 × 3 × 4 nodes" in texts_of(figure)
+    words = "axis 2 at 0.1235, axis 3 at 2024-03-01, 7 × 5 × 3 × 4 nodes"
+    assert words in [text.replace("\n", " ") for text in texts_of(figure)]
     x, y, shown = image_of(figure)
     np.testing.assert_allclose(shown, grid.grid(x, y, w[1], days[2])[..., 0])
     points = np.array(grid.points)
@@ -210,7 +214,7 @@ def test_dates_on_either_axis(unit, step):
 def test_one_axis_gives_the_figure_of_the_curve():
     points = smooth_field("sphere:2")[:, 2]
     figure = rendered(ss.GridSpline((U,), points, "sphere:2").plot())
-    assert "C² spline on Sphere(2)" in texts_of(figure) and "7 points, not-a-knot ends" in texts_of(figure)
+    assert "C² spline on sphere:2" in texts_of(figure) and "7 points, not-a-knot ends" in texts_of(figure)
     assert axes_named(figure, "speed")
     one, ax = ss.GridSpline((U,), points, "sphere:2"), Figure().add_subplot()
     assert one.plot(ax=ax, title="mine") is ax and one.plot(figsize=(5, 4)).get_size_inches().tolist() == [5, 4]
@@ -222,9 +226,85 @@ def test_grids_are_drawn_into_axes_and_files(tmp_path):
     grid = grid_on("so:3")
     ax = Figure(figsize=(6, 5)).add_subplot()
     assert grid.plot(ax=ax, title="mine") is ax and ax.get_title() == "mine"
-    assert (ax.get_xlabel(), ax.get_ylabel()) == ("axis 0", "axis 1")
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("axis 1", "axis 0")
     assert grid.plot(figsize=(5, 4)).get_size_inches().tolist() == [5, 4]
     raises("figsize and ax exclude each other", grid.plot, ax=ax, figsize=(5, 4))
     raises("ax has the projection", grid.plot, ax=Figure().add_subplot(projection="3d"))
     grid.plot(tmp_path / "grid.pdf")
     assert (tmp_path / "grid.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_axes_have_names_and_axis_0_is_vertical():
+    """As in xarray, so that rows of points are rows of the picture."""
+    grid = grid_on("r:1")
+    figure = grid.plot(axis_names=["latitude", "longitude"])
+    axes = axes_named(figure, "field")
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("longitude", "latitude")
+    low, high = axes.get_ylim()
+    assert low < U[0] < U[-1] < high
+    deep = ss.GridSpline((U, V, V), np.zeros((7, 5, 5, 1)), "r:1").plot(axis_names=["x", "y", "depth"])
+    assert any("depth at 0.1" in text for text in texts_of(deep))
+    assert any("x →" in text for text in texts_of(grid_on("r:3").plot(axis_names=["x", "y"])))
+    raises("axis_names must be a list of 2 strings", grid.plot, axis_names=["latitude"])
+    raises("axis_names must be a list of 2 strings", grid.plot, axis_names="xy")
+    raises("axis_names\\[1\\] must be a string", grid.plot, axis_names=["x", 1], error=TypeError)
+
+
+CORNERS = {
+    "432": [[0, 0, 1], [1, 0, 1], [1, 1, 1]],
+    "622": [[0, 0, 1], [1, 0, 0], [3**0.5, 1, 0]],
+    "422": [[0, 0, 1], [1, 0, 0], [1, 1, 0]],
+    "222": [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
+}
+
+
+@pytest.mark.parametrize("left", [False, True])
+@pytest.mark.parametrize("name", CORNERS)
+def test_inverse_pole_figure_colours(name, left):
+    """Crystals whose corner of the sector is along the direction are red, green and blue, whatever their symmetry."""
+    rng, sample = np.random.default_rng(3), np.array([0.0, 0.6, 0.8])
+    space = ss.Quotient("so:3", name, left=left)
+    group = ss.rotations.point_group(name)
+    for number, corner in enumerate(CORNERS[name]):
+        # An orientation maps vectors of the crystal to those of the sample, or with left=True the reverse.
+        to, start = ss.Sphere(2).project(np.array([sample, corner], float))
+        axis = np.cross(start, to)
+        turn = ss.rotations.from_rotation_vectors(axis / np.linalg.norm(axis) * np.arccos(start @ to))
+        turn = ss.rotations.from_rotation_vectors(rng.uniform(0, 6) * to) @ turn @ group[rng.integers(len(group))]
+        points = np.broadcast_to(turn.T if left else turn, (7, 5, 3, 3))
+        _, _, shown = image_of(ss.GridSpline((U, V), points, space).plot(direction=2 * sample))
+        np.testing.assert_allclose(shown[..., :3], np.broadcast_to(np.eye(3)[number], (*shown.shape[:2], 3)), atol=1e-3)
+
+
+def test_crystal_maps_are_continuous_and_explained():
+    """Neighbouring directions have similar colours, also across the edges of the sector; equivalent ones are equal."""
+    group = ss.rotations.point_group("432")
+    turned = ss.rotations.from_rotation_vectors(np.stack(np.broadcast_arrays(U[:, None], V, 0.3 * V), axis=-1) * 0.5)
+    grid = ss.GridSpline((U, V), turned, "so:3/432")
+    figure = rendered(grid.plot())
+    _, _, shown = image_of(figure)
+    # Colours are square roots of shares, whose slope is infinite at zero.
+    assert max(np.abs(np.diff(shown**2, axis=i)).max() for i in (0, 1)) < 0.1
+    assert {"001", "101", "111"} <= set(texts_of(figure))
+    (words,) = [text.replace("\n", " ") for text in texts_of(figure) if "along x₃ of the sample" in text]
+    assert "disorientation" in words
+    random = np.random.default_rng(0).integers(0, 24, (7, 5))
+    again = ss.GridSpline((U, V), turned @ group[random], "so:3/432")
+    np.testing.assert_allclose(image_of(again.plot())[2], shown, atol=1e-6)
+    raises("direction is for maps of crystals", grid_on("so:3").plot, direction=[1, 0, 0])
+    raises("direction must be three numbers", grid.plot, direction=[0, 0, 0])
+
+
+def test_tensors_have_a_bar_of_a_known_length():
+    figure = rendered(grid_on("spd:2").plot())
+    axes = axes_named(figure, "field")
+    (words,) = [text.replace("\n", " ") for text in texts_of(figure) if "the bar is" in text]
+    length = float(words.rpartition(" ")[2])
+    (bar,) = [own for own in axes.collections if isinstance(own, LineCollection) and len(own.get_segments()) == 3]
+    (ellipses,) = [own for own in axes.collections if isinstance(own, PolyCollection)]
+    drawn = np.ptp(bar.get_transform().transform(bar.get_segments()[0])[:, 0])
+    rings = ellipses.get_transform().transform(ellipses.get_paths()[0].vertices[:97])
+    tensor = grid_on("spd:2").points[0, 0]
+    half = np.sqrt(np.linalg.eigvalsh(tensor)[-1])
+    across = np.linalg.norm(rings - rings[:96].mean(axis=0), axis=1).max()
+    assert drawn / length == pytest.approx(across / half, rel=1e-2)

@@ -71,7 +71,7 @@ def test_quantiles_of_a_batch(name):
     # The sign is that of the increasing angle or number.
     signed = velocities[..., 0]
     if name == "sphere:1":
-        signed = at[..., 0] * velocities[..., 1] - at[..., 1] * velocities[..., 0]
+        signed = np.degrees(at[..., 0] * velocities[..., 1] - at[..., 1] * velocities[..., 0])
     for time, values in zip(x, signed.T, strict=True):
         drawn = corners[corners[:, 0] == time, 1]
         expected = np.quantile(values, [0.05, 0.95])
@@ -105,6 +105,7 @@ def test_batches_close_to_their_mean_show_it(name):
     rates = {
         "r:1": lambda: velocities[..., 0],
         "se:3": lambda: np.linalg.norm(velocities[..., :3, 3], axis=-1),
+        "torus:2": lambda: np.degrees(batch.speed(median[:, 0])),
     }.get(name, lambda: batch.speed(median[:, 0]))()
     np.testing.assert_allclose(median[:, 1], np.median(rates, axis=0), atol=1e-9)
     # Far from each other, some of the curves have their names instead.

@@ -152,8 +152,8 @@ def test_panels_of_factors_and_units():
     figure = rendered(spline.plot())
     labels = [axes.get_ylabel() for axes in panels_of(figure, "λ", "noise σ")]
     assert labels == [
-        *("λ\nof so:3, s³", "λ\nof euclidean:3, s³"),
-        *("noise σ\nof so:3, rad", "noise σ\nof euclidean:3"),
+        *("λ\nof so:3, s³", "λ\nof r:3, s³"),
+        *("noise σ\nof so:3, rad", "noise σ\nof r:3"),
     ]
     sphere = ss.Sphere(2)
     points = sphere.exp([1.0, 0, 0], 0.1 * y[:, :2] @ np.array([[0.0, 1, 0], [0, 0, 1]]))

@@ -63,8 +63,9 @@ def test_views_that_depend_on_the_curves_are_drawn_once():
 def test_invalid_options():
     plot = spline_on("r:2").plot
     raises("color must be a colour of matplotlib", plot, color="no colour")
-    raises("figsize must be width and height", plot, figsize=(1, -1))
-    raises("figsize must be width and height", plot, figsize=(1, np.nan))
+    raises("figsize must be a width in inches, or width and height", plot, figsize=(1, -1))
+    raises("figsize must be a width in inches, or width and height", plot, figsize=(1, np.nan))
+    raises("figsize must be a width in inches, or width and height", plot, figsize=0)
     raises("figsize and ax exclude each other", plot, figsize=(5, 4), ax=axes_for("r:2"))
     raises("file and ax exclude each other", plot, "a.png", ax=axes_for("r:2"))
     for name in ("label", "title", "show"):

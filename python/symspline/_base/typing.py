@@ -88,15 +88,22 @@ class AxesLook(TypedDict, total=False):
 class PageLook(AxesLook, total=False):
     """The options of plots that create a figure."""
 
-    figsize: tuple[float, float] | None
+    figsize: tuple[float, float] | float | None
 
 
-class GridLook(TypedDict, total=False):
-    """The options of plots of grids that create a figure."""
+class GridAxesLook(TypedDict, total=False):
+    """The options of plots of grids into existing axes."""
 
     title: str | None
-    figsize: tuple[float, float] | None
     show: bool
+    axis_names: Sequence[str] | None
+    direction: ArrayLike | None
+
+
+class GridLook(GridAxesLook, total=False):
+    """The options of plots of grids that create a figure."""
+
+    figsize: tuple[float, float] | float | None
 
 
 Extrapolate = Literal["raise", "geodesic", "periodic"] | bool | None

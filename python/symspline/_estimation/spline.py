@@ -186,6 +186,14 @@ def _as_tuple(value: object) -> tuple[Any, ...]:
     return value if isinstance(value, tuple) else (value,)
 
 
+def _in_words(name: str, found: Parameter) -> str:
+    """Describe a constant by its value, rounded as its accuracy permits, and the largest of its standard deviations."""
+    std = float(np.max(found.std))
+    digits = max(0, 1 - int(np.floor(np.log10(std)))) if std > 0 else 3
+    value = ", ".join(f"{x:.{digits}f}" for x in np.ravel(found.value))
+    return f"{name} {f'({value})' if np.size(found.value) > 1 else value} ± {std:.2g}"
+
+
 def _are_used(weights: object, count: int) -> NDArray[np.bool_]:
     """Return which of some points have a weight, or an information matrix, that is not zero."""
     used = np.ones(count, bool)
@@ -268,7 +276,8 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
     def _made_of(self, radius: float | None = None) -> str:
         counts = [f"{len(self._times_of(given))} {type(given).__name__}" for given in self._measurements]
         df = " and ".join(f"{part.report.df:.3g}" for part in self._smoothed[:3])
-        return ", ".join([*counts, f"{self._times.shape[-1]} knots", f"{df} degrees of freedom"])
+        words = [*counts, f"{self._times.shape[-1]} knots", f"{df} degrees of freedom"]
+        return ", ".join(words + [_in_words(name, found) for name, found in self._parameters.items()])
 
     # ---- plots ----
 
@@ -292,34 +301,38 @@ class EstimatedSpline(SmoothingSpline[P, Any]):
         for measurement in self._measurements:
             if not isinstance(measurement, Points) or measurement.factor not in (None, number):
                 continue
-            y: Any = measurement.y
-            weights = measurement.weights
-            if measurement.factor is None and isinstance(self.space, Product):
-                y = parts_of(y, self.space, "y")[number]
-                weights = weights[number] if isinstance(weights, tuple) else weights
             if _are_partial(measurement, factor):
                 continue
-            rows = factor._numbers(factor._doubles(y, "y"))
-            used = factor._where_finite(rows) & _are_used(weights, len(rows))
+            rows, used = self._rows_of(measurement, number)
             times.append(self._times_of(measurement)[used])
             points.append(np.asarray(factor.project(rows[used])) if used.any() else rows[used])
         order = np.argsort(np.concatenate(times), kind="stable")
         return np.concatenate(times)[order], np.concatenate(points)[order]
 
+    def _rows_of(self, measurement: Points, number: int) -> tuple[Array, NDArray[np.bool_]]:
+        """Return the points of a measurement in one factor, and which of them have residuals."""
+        factor, weights = factors_of(self.space)[number], measurement.weights
+        y: Any = measurement.y
+        if measurement.factor is None and isinstance(self.space, Product):
+            y = parts_of(y, self.space, "y")[number]
+            weights = weights[number] if isinstance(weights, tuple) else weights
+        rows = factor._numbers(factor._doubles(y, "y"))
+        return rows, factor._where_finite(rows) & _are_used(weights, len(rows))
+
     def _panels_below(self, x: Doubles) -> list[SidePanel]:
         panels = super()._panels_below(x)
         kinds = [type(measurement).__name__ for measurement in self._measurements]
         for number, (measurement, kind) in enumerate(zip(self._measurements, kinds, strict=True)):
-            factor = factors_of(self.space)[measurement.factor or 0]
-            if isinstance(measurement, Points) and not _are_partial(measurement, factor):
-                continue
             label = kind if kinds.count(kind) == 1 else f"{kind} {kinds[: number + 1].count(kind)}"
             given = self._residuals[number]
             # Velocities on products and for poses have one array per part.
             values = np.concatenate([array.reshape(len(array), -1) for array in _as_tuple(given)], axis=-1)
             named = isinstance(measurement, (BodyRates, SpecificForce)) and values.shape[1] == 3
-            label = f"{label}\nresidual / σ"
-            panels.append(SidePanel(label, self._times_of(measurement), values, ("x", "y", "z") if named else ()))
+            label, times = f"{label}\nresidual / σ", self._times_of(measurement)
+            if isinstance(measurement, Points) and len(values) < len(times):
+                # Points that are not used have no residuals.
+                times = times[self._rows_of(measurement, measurement.factor or 0)[1]]
+            panels.append(SidePanel(label, times, values, ("x", "y", "z") if named else ()))
         return panels
 
     # ---- batches, files and pickles ----

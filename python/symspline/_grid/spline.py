@@ -7,9 +7,22 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, Unpack, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .._base.arrays import checked_atol, checked_flag, short_repr, whole_number
-from .._base.typing import Array, Extrapolate, File, GridLook, OnFailure, P, PointsLike, Progress, State, TimesLike
+from .._base.typing import (
+    Array,
+    Extrapolate,
+    File,
+    GridAxesLook,
+    GridLook,
+    OnFailure,
+    P,
+    PointsLike,
+    Progress,
+    State,
+    TimesLike,
+)
 from .._core import ValidationError
 from .._curves.derivatives import read_cotangent
 from .._curves.failures import raise_or_warn
@@ -492,24 +505,31 @@ class GridSpline(Generic[P]):
     @overload
     def plot(self, file: File | None = None, *, ax: None = None, **look: Unpack[GridLook]) -> Figure: ...
     @overload
-    def plot(self, file: None = None, *, ax: Axes, title: str | None = None, show: bool = False) -> Axes: ...
+    def plot(self, file: None = None, *, ax: Axes, **look: Unpack[GridAxesLook]) -> Axes: ...
     def plot(
         self,
         file: File | None = None,
         *,
         ax: Axes | None = None,
         title: str | None = None,
-        figsize: tuple[float, float] | None = None,
+        figsize: tuple[float, float] | float | None = None,
         show: bool = False,
+        axis_names: Sequence[str] | None = None,
+        direction: ArrayLike | None = None,
     ) -> Figure | Axes:
         """Plot the points over the first two axes.
+
+        As in xarray, axis 0 is vertical and axis 1 is horizontal, and both have their coordinates. Use
+        ``figure.axes[0].invert_yaxis()`` for an image whose first row is at the top, as ``imshow`` shows it.
 
         The picture depends on the space:
 
         - S²: arrows of the first two coordinates over an image of the angle to the third axis; CP¹ and the complex
           Gr(1, 2) likewise, with Bloch vectors.
         - SO(3), SU(2) and S³ (unit quaternions, scalar first): an orientation map. The colour is the direction of the
-          axis that moves most; lines show the misorientation to the node with a ring.
+          axis that moves most; lines show the rotation from the node with a ring.
+        - Quotients of SO(3) by the point groups 222, 422, 622 and 432, for maps of crystals: the colours of inverse
+          pole figures, and lines of the disorientation to the node with a ring.
         - SPD(2) and SPD(3): ellipses over an image of the anisotropy, for SPD(3) with the colours of the longest axis.
         - S¹, SO(2), O(2), U(1), RP¹ and Gr(1, 2): the angle.
         - R¹: an image. R²: arrows over an image of their lengths. R³: a surface; SE(3): a surface with frames.
@@ -526,6 +546,10 @@ class GridSpline(Generic[P]):
             ``projection="3d"``, all other spaces ordinary ones.
         title, figsize, show : optional
             As for `symspline.Curve.plot`.
+        axis_names : sequence of str, optional
+            Names of all axes of the grid, such as ``["latitude", "longitude"]``.
+        direction : array_like, shape (3,), optional
+            Direction of the sample whose crystal direction the colours of a crystal map show, x₃ by default.
 
         Returns
         -------
@@ -548,15 +572,20 @@ class GridSpline(Generic[P]):
         --------
         >>> import numpy as np, symspline as ss
         >>> u = np.linspace(0, 1, 8)
-        >>> figure = ss.GridSpline((u, u), (u[:, None] * u)[..., None], "r:1").plot()
+        >>> grid = ss.GridSpline((u, 2 * u), (u[:, None] * u)[..., None], "r:1")
+        >>> axes = grid.plot(axis_names=["latitude", "longitude"]).axes[0]
+        >>> axes.get_xlabel(), axes.get_ylabel()
+        ('longitude', 'latitude')
         """
         require_matplotlib()
-        from .._plotting import checked_look, plot, plot_grid
+        from .._plotting import checked_axis_names, checked_direction, checked_look, plot, plot_grid
 
         look = checked_look(file, ax, None, None, title, figsize, show) | {"ax": ax, "show": show}
+        names = checked_axis_names(axis_names, len(self._axes))
+        sample = checked_direction(direction, self._space)
         drawn: Figure | Axes
         if len(self._axes) > 1:
-            drawn = plot_grid(self, file, **look)
+            drawn = plot_grid(self, file, axis_names=names, direction=sample, **look)
             return drawn
         if self.report.missing:
             raise ValidationError(

@@ -8,7 +8,7 @@ curve. Colours and fonts are those of the active style of matplotlib.
 """
 
 from .animation import animate
-from .grid import plot_grid
+from .grid import checked_axis_names, checked_direction, plot_grid
 from .plot import checked_look, compare, plot
 
-__all__ = ["animate", "checked_look", "compare", "plot", "plot_grid"]
+__all__ = ["animate", "checked_axis_names", "checked_direction", "checked_look", "compare", "plot", "plot_grid"]

@@ -49,6 +49,7 @@ from .style import (
     plain,
     round_start,
     scale_of,
+    small,
     window,
 )
 
@@ -59,8 +60,9 @@ _STEMS = 25
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 _LONG = 2.0
 """Curves are in a view that is wide or narrow if one side is longer than the other by this factor."""
-_FILLED, _ZOOM = 0.76, 1.4
-"""The part of axes that a box fills, if it is enlarged by no more than this factor."""
+_FILLED, _ZOOM, _AROUND = 0.76, 1.4, (0.35, 0.04)
+"""The part of axes that a box fills, if it is enlarged by no more than this factor, and the smallest space around it in
+inches, with a part per point of the size of labels."""
 
 
 # ---- the plane ----
@@ -210,7 +212,8 @@ def draw_box(
         wall.set_major_locator(MaxNLocator(max(1 if few else 3, round((3 if few else 5) * side / sides.max()))))
         if panel.mine or not wall.label.get_text():
             wall.label.set_text(named_from(f"x{subscript}", start))
-            wall.labelpad = 5 * bool(start)
+            # Matplotlib adds 21 points, whatever the size of text is.
+            wall.labelpad = 5 * bool(start) + 3.6 * small() - 21
     # Flat boxes are seen from farther above. Choose the direction from which the curve looks widest, and of two similar
     # ones that from which it runs to the right.
     wide = panel.axes[0].bbox.width > 1.5 * panel.axes[0].bbox.height
@@ -236,7 +239,9 @@ class Box(Axes3D):  # type: ignore[misc]
         """Choose the square for the box and the labels around it."""
         place, figure = self.get_position(original=True), self.get_figure().bbox
         size = np.array([place.width * figure.width, place.height * figure.height])
-        side = _FILLED * float((size / self.shares).min()) / np.array([figure.width, figure.height])
+        labels = (_AROUND[0] + _AROUND[1] * self.xaxis.label.get_fontsize()) * self.get_figure(root=True).dpi
+        filled = np.maximum(np.minimum(_FILLED * size, size - 2 * labels), 0.2 * size)
+        side = float((filled / self.shares).min()) / np.array([figure.width, figure.height])
         middle = np.array([place.x0 + place.x1, place.y0 + place.y1]) / 2
         self._set_position(Bbox.from_bounds(*(middle - side / 2), *side), which="active")
 

@@ -24,7 +24,19 @@ from .._curves.ends import NATURAL
 from .._curves.fit import FitProblem, fit, read
 from .._curves.solve import DEFAULTS
 from .._spaces import AmbiguousMeanWarning, AnySpace, Product, Space, SpecialEuclidean, Sphere
-from .style import DATA, DATES, Indices, Numbers, colors, evenly, ink, named_from, round_start, spline_color
+from .style import (
+    DATA,
+    DATES,
+    Indices,
+    Numbers,
+    colors,
+    distinct,
+    evenly,
+    ink,
+    named_from,
+    round_start,
+    spline_color,
+)
 
 SECOND = np.timedelta64(1, "s")
 FEW, _OF_MANY = 5, 3
@@ -471,7 +483,8 @@ def curves_of(
         raise ValidationError("there is nothing to plot: the fit failed (a cut-locus fault, see spline.report)")
     drawn = good[evenly(len(good), MOST)]
     few = drawn[evenly(len(drawn), FEW if len(drawn) <= FEW else _OF_MANY)]
-    looks = dict(zip(few.tolist(), colors(len(few)), strict=True))
+    # A few of many curves differ from each other and from the grey ones behind them.
+    looks = dict(zip(few.tolist(), colors(len(few)) if len(few) == len(drawn) else distinct(), strict=False))
     made: list[Curve] = []
     mean = _mean_of(curve, valid, axis, color, label, alone) if len(drawn) > len(few) else None
     if mean is not None:

@@ -124,17 +124,14 @@ def middle_of(points: FloatArray) -> tuple[float, float]:
     return float(lon), float(lat)
 
 
-def facing(points: FloatArray, lats: tuple[float, float]) -> Globe:
-    """Return the globe above a latitude in a range in which most points, and the first of them, are well in front.
-
-    It is close to that of `middle_of`.
-    """
+def facing(points: FloatArray) -> Globe:
+    """Return a globe on which most points, and the first of them, are well in front, close to that of `middle_of`."""
     points = np.concatenate([points[:1], points[:: 1 + len(points) // 500]])
     lon, lat = middle_of(points)
-    best, highest = Globe.above(lon, float(np.clip(lat, *lats))), -np.inf
+    best, highest = Globe.above(lon, lat), -np.inf
     for aside in range(-75, 76, 15):
         for up in range(-30, 31, 15):
-            globe = Globe.above(lon + aside, float(np.clip(lat + up, *lats)))
+            globe = Globe.above(lon + aside, float(np.clip(lat + up, -90, 90)))
             height = points @ globe.up
             score = np.mean(height > _FRONT) + _START * (height[0] > _FRONT) - 1e-3 * np.hypot(aside, up)
             if score > highest:
@@ -143,7 +140,7 @@ def facing(points: FloatArray, lats: tuple[float, float]) -> Globe:
 
 
 def draw_globe(axes: Axes, globe: Globe, spacing: int, half: bool = False) -> None:
-    """Draw a shaded globe with a graticule, or the half of it that is seen, with a red rim."""
+    """Draw a shaded globe with a graticule, or the half of it that is seen, with a red rim and its own graticule."""
     axes.set_axis_off()
     axes.set(aspect="equal", xlim=(-1.06, 1.06), ylim=(-1.06, 1.06))
     steps = np.linspace(-180, 180, 721)
@@ -156,7 +153,8 @@ def draw_globe(axes: Axes, globe: Globe, spacing: int, half: bool = False) -> No
     image.set_clip_path(axes.add_patch(Circle((0, 0), 1, fill=False, zorder=3, **edge)))
     lines = [from_lonlat(steps, lat) for lat in range(-90 + spacing, 90, spacing)]
     lines += [from_lonlat(lon, np.linspace(-90, 90, 721)) for lon in range(-180, 180, spacing)]
-    for line in lines:
+    turn = np.stack([globe.east, globe.north, globe.up]) if half else np.eye(3)
+    for line in (points @ turn for points in lines):
         axes.plot(*globe.visible(line).T, color=ink(0.25), linewidth=0.6, alpha=0.7, zorder=2)
 
 
@@ -335,6 +333,10 @@ _PART = 120
 _POLE = 60
 """Neighbouring samples are on both sides of a pole if their longitudes differ by more degrees."""
 _NORTH = np.array([0.0, 0.0, 1.0])
+_TEXTBOOK = 30.0, 20.0
+"""Longitude and latitude from which a whole Bloch sphere is seen."""
+_CROSSINGS = 8
+"""The largest number of crossings of the rim that have letters."""
 _TWICE = "\nangles on it are twice the distances of states"
 _BLOCH = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "|0⟩": (0.0, 0.0, 1.0), "|1⟩": (0.0, 0.0, -1.0)}
 _AXES = {"x₁": (1.0, 0.0, 0.0), "x₂": (0.0, 1.0, 0.0), "x₃": (0.0, 0.0, 1.0)}
@@ -387,10 +389,13 @@ def _draw_scale(axes: Axes, radius: float) -> None:
 
 
 def _draw_bloch(panel: Panel, curves: Sequence[Curve]) -> None:
-    """Draw states of CP¹ on the Bloch sphere with |0⟩ at the top or, if they are close together, on a part of it."""
+    """Draw states of CP¹ on the Bloch sphere or, if they are close together, on a part of it.
+
+    As in textbooks, |0⟩ is at the top, x points to the viewer and to the left, and y to the right.
+    """
     (axes,) = panel.axes
     points = np.concatenate([bloch_vectors(curve.extent) for curve in curves])
-    globe, is_part = _draw_globe(axes, points, points, spacing=30, lats=(10, 40), labels=_BLOCH)
+    globe, is_part = _draw_globe(axes, points, points, spacing=30, view=_TEXTBOOK, labels=_BLOCH)
     for curve in curves:
         # Angles between Bloch vectors are twice the distances of states.
         radii = None if curve.radii is None else 2 * curve.radii
@@ -432,11 +437,23 @@ def _hemisphere(what: str, vectors: Numbers) -> View:
             _draw_on_globe(axes, globe, curve, whole, given, radii)
             if len(whole) > len(line):
                 curve.tracks.append((axes, curve.x, globe.flat(shown)))
-        meaning = "the normal of a plane" if what == "plane" else "the direction of a line"
-        words = "part of the sphere: opposite points" if is_part else "opposite points of the red rim"
-        note(axes, f"each point is {meaning};\n{words} are the same {what}")
+                if curve.alone:
+                    _name_crossings(axes, globe, whole)
+        meaning = "is the normal of a plane" if what == "plane" else "is the direction of a line"
+        words = f"{'part of the sphere' if is_part else 'half sphere from above'}: each point {meaning}"
+        note(axes, words + ("" if is_part else f"\nopposite points of the red rim are the same {what}"))
 
     return View(draw, has_many=True, is_turned=True)
+
+
+def _name_crossings(axes: Axes, globe: Globe, line: FloatArray) -> None:
+    """Write one letter at both points of the rim where a curve leaves the half sphere and where it returns."""
+    (breaks,) = np.nonzero(np.isnan(line[:, 0]))
+    look: Look = {"ha": "center", "va": "center", "fontsize": "small", "color": MARK, "zorder": 7}
+    for letter, i in zip("abcdefgh"[:_CROSSINGS], breaks, strict=False):
+        for at in (line[i - 1], line[i + 1]):
+            x, y = 1.09 * globe.flat(at)
+            axes.text(x, y, letter, **look)
 
 
 # Points of RP² and Gr(1, 3) are lines. Points of Gr(2, 3) are planes, represented by their normals.
@@ -494,7 +511,7 @@ def _draw_globe(
     seen: FloatArray,
     small: float = _SMALL,
     spacing: int = 15,
-    lats: tuple[float, float] = (-90, 90),
+    view: tuple[float, float] | None = None,
     labels: Any = None,
     half: bool = False,
 ) -> tuple[Globe, bool]:
@@ -512,8 +529,8 @@ def _draw_globe(
         The largest distance from the middle of curves that are drawn in a frame.
     spacing : int
         Spacing of the graticule in degrees.
-    lats : pair of float
-        Range of the latitudes from which the globe may be seen.
+    view : pair of float or None
+        Longitude and latitude from which a whole globe is seen; None if they depend on the curves.
     labels : dict or None
         Labelled directions, such as "x".
     half : bool
@@ -524,7 +541,7 @@ def _draw_globe(
     if frame is not None:
         draw_frame(axes, *frame)
         return frame[0], True
-    globe = Globe.above(*middle_of(vectors)) if half else facing(seen, lats)
+    globe = Globe.above(*(view or middle_of(vectors))) if view or half else facing(seen)
     draw_globe(axes, globe, spacing, half)
     if labels:
         axes.set(xlim=(-1.22, 1.22), ylim=(-1.22, 1.22))

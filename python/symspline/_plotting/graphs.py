@@ -75,6 +75,8 @@ class Graphs:
         Whether the label is also above several axes.
     equal_scales : bool
         Whether all axes have the same scale.
+    wraps : bool
+        Whether lines break where numbers leave the middle period, unless there is a batch.
     """
 
     label: str
@@ -85,6 +87,7 @@ class Graphs:
     period: float = np.inf
     has_title: bool = False
     equal_scales: bool = False
+    wraps: bool = False
 
     def view(self, height: float = 3.8) -> View:
         """Return the view that has these graphs."""
@@ -93,6 +96,9 @@ class Graphs:
     def draw(self, panel: Panel, curves: Sequence[Curve]) -> None:
         """Draw the numbers of curves; all of them in the same axes if those are of the user."""
         drawn = _without_jumps(curves, lambda curve: partial(self.numbers, curve.first_point), self.period)
+        wraps = self.wraps and curves[0].batch is None and _leave(drawn, self.period)
+        if wraps:
+            drawn = [(_broken(line, self.period), _wrapped(given, self.period)) for line, given in drawn]
         groups = self.groups or [(name, [i]) for i, name in enumerate(self.names)]
         if not panel.mine and len(self.names) > 1:
             groups = [(self.label, range(len(self.names)))]
@@ -109,6 +115,10 @@ class Graphs:
             else:
                 self._draw_several(panel, axes, curves, drawn, numbers)
         self._set_limits(made, drawn)
+        for axes in made if wraps else ():
+            # Whole periods, so that both sides of a break are at the edges.
+            axes.set_ylim(-0.53 * self.period, 0.53 * self.period)
+            axes.set_yticks(self.period * np.arange(-2, 3) / 4)
 
     def _draw_one(
         self, axes: Axes, curves: Sequence[Curve], drawn: _Drawn, number: int, start: float, is_low: bool
@@ -123,7 +133,7 @@ class Graphs:
         for curve, (line, given) in zip(curves, drawn, strict=True):
             dense = len(given) > FEW_KNOTS
             look: Look = {"color": DATA if dense else ink()} if curve.noise is None and curve.alone else {}
-            look |= {"markersize": float(np.clip(30 / np.sqrt(max(len(given), 1)), 1.2, 3))}
+            look |= {"markersize": float(np.clip(30 / np.sqrt(max(len(given), 1)), 2, 3))}
             look |= {"zorder": 1.8} if dense else {}
             values = curve.graph(line[:, number] - start)
             unit = self.growth and self.growth(np.linalg.norm(line, axis=1))
@@ -212,6 +222,23 @@ def _without_jumps(
     return made
 
 
+def _leave(drawn: _Drawn, period: float) -> bool:
+    """Return whether numbers leave the middle period."""
+    return any(len(rows) > 0 and bool(np.nanmax(np.abs(rows)) > period / 2) for pair in drawn for rows in pair)
+
+
+def _wrapped(rows: FloatArray, period: float) -> FloatArray:
+    """Return the numbers of the middle period that differ from others by multiples of it."""
+    return np.asarray(rows - period * np.rint(rows / period))
+
+
+def _broken(line: FloatArray, period: float) -> FloatArray:
+    """Return a line in the middle period, without the samples at which it leaves it."""
+    line = _wrapped(line, period)
+    line[1:][np.abs(np.diff(line, axis=0)) > period / 2] = np.nan
+    return line
+
+
 def _unwrapped(lines: FloatArray, period: float, start: FloatArray) -> FloatArray:
     """Return numbers that begin close to a start and do not jump in time, which is the last axis but one."""
     if np.isinf(period):
@@ -285,12 +312,13 @@ def _several(
     names: Sequence[str],
     numbers: Callable[[Any, Any], FloatArray],
     period: float = np.inf,
+    wraps: bool = False,
 ) -> View:
     """Return the view of several numbers in the same axes.
 
     For several curves, the numbers with the largest ranges have axes of their own, where curves have their colours.
     """
-    whole = Graphs(label, names, numbers, [(label, range(len(names)))], period=period)
+    whole = Graphs(label, names, numbers, [(label, range(len(names)))], period=period, wraps=wraps)
     if not are_compared(curves):
         return whole.view()
     first = curves[0].first_point
@@ -302,7 +330,8 @@ def _several(
     if len(kept) < len(names):
         words += f", {len(kept)} of {len(names)}: those with the largest ranges"
     some = [names[i] for i in kept]
-    few = Graphs(words, some, lambda _, points: numbers(first, points)[:, kept], period=period, has_title=True)
+    some_of = lambda _, points: numbers(first, points)[:, kept]  # noqa: E731
+    few = Graphs(words, some, some_of, period=period, has_title=True, wraps=wraps)
     return few.view()._replace(draw=lambda panel, curves: (few if panel.mine else whole).draw(panel, curves))
 
 
@@ -351,9 +380,9 @@ def independent(space: Space) -> Indices:
 
 
 def torus_angles(curves: Sequence[Curve]) -> View:
-    """Return the view of angles in degrees, without jumps. The first ones are between −180 and 180 degrees."""
+    """Return the view of angles in degrees between −180 and 180, where lines break."""
     names = component_names(curves[0].space.point_shape, False)
-    return _several(curves, "angles, degrees", names, lambda _, points: np.degrees(points), 360)
+    return _several(curves, "angles, degrees", names, lambda _, points: np.degrees(points), 360, wraps=True)
 
 
 def ratios(curves: Sequence[Curve]) -> View:
@@ -378,7 +407,9 @@ def angles_to_first(curves: Sequence[Curve]) -> View:
         view.draw(panel, curves)
         largest = max(numbers(curve.first_point, curve.points).max() for curve in curves)
         if panel.mine and largest > _RIGHT and view.rows == 1:
-            panel.explain("principal angles are at most 90°: they turn back there, but the curve is smooth")
+            # The names of the angles are to the right.
+            words = "principal angles are at most 90°: they turn back there, but the curve is smooth"
+            panel.explain(words, 0.4 * axes_size(panel.axes[0])[0])
             panel.axes[0].yaxis.set_major_locator(MultipleLocator(30))
             panel.axes[0].axhline(90, color=ink(0.4), linewidth=0.8, zorder=1)
 

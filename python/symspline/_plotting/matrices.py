@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import partial
 from itertools import pairwise
-from textwrap import fill, wrap
+from textwrap import wrap
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,8 +38,9 @@ REACH = 0.5
 """The largest distance in inches by which a symbol extends to the left and right."""
 _LEAST_ROW = 0.6
 """The smallest height of a row in inches."""
-_LEAST, _SHORT = 12.0, 0.32
-"""Arrows are shorter than the time axis by a factor, and the smallest length in inches if there are many."""
+_LEAST, _SHORT, _CROWDED = 8.0, 0.32, 5.0
+"""Arrows are shorter than the time axis by a factor, the smallest length in inches if there are many, and the width of
+axes in which fewer of them are drawn."""
 _BESIDE = 20
 """The largest number of curves of a batch that are drawn beside their mean."""
 _PAIRS = 15
@@ -57,17 +58,17 @@ _CIRCLE = np.stack([np.cos(_ANGLES), np.sin(_ANGLES), 0 * _ANGLES], axis=-1)
 # ---- symbols in rows along a time axis ----
 
 
-class _Inches(Affine2DBase):
-    """Inches in axes of their present size, which later become longer or shorter with the height of the axes."""
+class Inches(Affine2DBase):
+    """Inches in axes of their present size, which later become longer or shorter with the smaller side of the axes."""
 
     def __init__(self, axes: Axes) -> None:
         super().__init__()
-        self.box, self.height = axes.bbox, axes_size(axes)[1]
+        self.box, self.size = axes.bbox, axes_size(axes)
         self.set_children(axes.bbox)
 
     def get_matrix(self) -> FloatArray:
         """Return the matrix for the size that the axes have now."""
-        scale = self.box.height / self.height
+        scale = min(self.box.width / self.size[0], self.box.height / self.size[1])
         return np.diag([scale, scale, 1.0])
 
 
@@ -90,24 +91,27 @@ class _Row(NamedTuple):
         """Whether the symbols are given points."""
         return self.name in ("given", "data") or not self.curve.has_line
 
-    def symbols(self, width: float, reach: float) -> tuple[FloatArray, Any, FloatArray | None]:
+    def symbols(self, width: float, reach: float, apart_by: float) -> tuple[FloatArray, Any, FloatArray | None]:
         """Return times on matplotlib's axis, points, and the radii of the band, for symbols that fit into the row.
 
         The time axis has ``width`` inches, and symbols extend by at most ``reach`` inches to the left and right. Given
-        points that are close together are omitted; samples of the curve are equidistant. If all given points have a
-        symbol, the curve has one below each of them, and equidistant ones between.
+        points that are closer together than ``apart_by`` times this are omitted; samples of the curve are equidistant.
+        If all given points have a symbol, the curve has one below each of them, and equidistant ones between.
         """
         curve = self.curve
         if self.has_given:
             times = curve.on_axis(curve.given_x)
-            kept = apart(times, 1.1 * reach / width * (curve.times[-1] - curve.times[0]))
+            kept = apart(times, apart_by * reach / width * (curve.times[-1] - curve.times[0]))
             return times[kept], curve.given[kept], None
         number = max(2, int(width / (2 * reach)) + 1)
         wanted = np.linspace(curve.x[0], curve.x[-1], number)
         step = wanted[1] - wanted[0]
         nodes = curve.x[curve.knots]
-        if curve.noise is None and curve.has_nodes and self.name and np.diff(nodes).min(initial=np.inf) > 0.55 * step:
-            inner = [np.linspace(*ends, 1 + max(1, int((ends[1] - ends[0]) / step + 0.6))) for ends in pairwise(nodes)]
+        shortest, part = np.diff(nodes).min(initial=np.inf), 0.49 * apart_by
+        if curve.noise is None and curve.has_nodes and self.name and shortest > part * step:
+            inner = [
+                np.linspace(*ends, 1 + max(1, int((ends[1] - ends[0]) / step + 1 - part))) for ends in pairwise(nodes)
+            ]
             wanted = np.unique(np.concatenate(inner))
         even = np.searchsorted(curve.x, wanted)
         # There are no samples in gaps.
@@ -164,9 +168,9 @@ class _Rows:
         row = self.rows[-1]
         return self.width / (4.2 * len(row.curve.given)) if row.name == "curve" and row.curve.noise is None else REACH
 
-    def symbols(self, reach: float) -> list[tuple[FloatArray, Any, FloatArray | None]]:
-        """Name the rows, and return their symbols, which extend by at most ``reach`` inches."""
-        made = [row.symbols(self.width, reach) for row in self.rows]
+    def symbols(self, reach: float, apart_by: float) -> list[tuple[FloatArray, Any, FloatArray | None]]:
+        """Name the rows, and return their symbols, which extend by ``reach`` inches and are ``apart_by`` times that."""
+        made = [row.symbols(self.width, reach, apart_by) for row in self.rows]
         names = [row.title(len(symbols[0]), self.panel.mine) for row, symbols in zip(self.rows, made, strict=True)]
         self.axes.set_yticks([-i for i in range(len(names))], names, fontsize="small")
         self.axes.tick_params(axis="y", length=0)
@@ -184,9 +188,14 @@ class _Rows:
         return {
             "offsets": np.column_stack([times, np.full(len(times), -row)]),
             "offset_transform": self.axes.transData,
-            "transform": _Inches(self.axes),
+            "transform": Inches(self.axes),
             "clip_on": False,
         }
+
+    @property
+    def view_width(self) -> float:
+        """Width in inches of the axes of space above the right corner."""
+        return 0.13 * float(rcParams["font.size"])
 
     def draw_view(self) -> None:
         """Draw the axes of space above the right corner, as they are seen. Axes of the user have no space for them."""
@@ -198,7 +207,7 @@ class _Rows:
         look: Look = {"units": "inches", "scale_units": "inches", "angles": "uv", "in_layout": False, "clip_on": False}
         look |= {"scale": 0.4 / size, "width": 0.14 * size, "color": ink(), "transform": axes.transAxes}
         axes.quiver(*foot[:, None].repeat(3, 1), *VIEW[:2], **look)
-        look = {"transform": axes.transAxes, "fontsize": "x-small", "ha": "center", "va": "center"}
+        look = {"transform": axes.transAxes, "fontsize": "small", "ha": "center", "va": "center"}
         for name, end in zip(("x₁", "x₂", "x₃", "view"), (*VIEW[:2].T, np.array([-1.6, 0])), strict=True):
             x, y = foot + 0.36 * end * inches
             axes.text(x, y, name, **look)
@@ -265,15 +274,19 @@ def _rotation_vectors(matrices: Numbers, first: FloatArray, name: str) -> View:
         # In long gaps the vector may jump where the angle reaches half a turn.
         return np.where(np.linalg.norm(vectors, axis=1, keepdims=True) < _JUMP, vectors, np.nan)
 
-    return Graphs(
-        f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}",
-        ["about x₁", "about x₂", "about x₃"],
-        numbers,
-        # The largest singular value of the inverse of the left Jacobian.
-        growth=lambda angles: np.asarray(1 / np.sinc(angles / 2 / np.pi)),
-        has_title=True,
-        equal_scales=True,
-    ).view(4.8)
+    return (
+        Graphs(
+            f"rotation vector log(R R₀ᵀ) in rad, R₀: {name}",
+            ["about x₁", "about x₂", "about x₃"],
+            numbers,
+            # The largest singular value of the inverse of the left Jacobian.
+            growth=lambda angles: np.asarray(1 / np.sinc(angles / 2 / np.pi)),
+            has_title=True,
+            equal_scales=True,
+        )
+        .view(4.8)
+        ._replace(has_many=True)
+    )
 
 
 def _draw_rotations(panel: Panel, curves: Sequence[Curve], matrices: Numbers, name: str) -> None:
@@ -284,7 +297,9 @@ def _draw_rotations(panel: Panel, curves: Sequence[Curve], matrices: Numbers, na
     rows = _Rows(panel, curves)
     length = min(max(_SHORT, min(REACH, 1.2 * rows.reach_between())), 0.48 * rows.height, rows.width / _LEAST)
     words = [f"frames: rotations by {name}"] * bool(name) + [rows.words]
-    for i, (row, (times, symbols, radii)) in enumerate(zip(rows.rows, rows.symbols(0.8 * length), strict=True)):
+    apart_by = 1.8 if rows.width < _CROWDED else 1.1
+    made = rows.symbols(0.8 * length, apart_by)
+    for i, (row, (times, symbols, radii)) in enumerate(zip(rows.rows, made, strict=True)):
         frames = matrices(symbols)
         if radii is not None:
             _draw_discs(rows, i, times, length, frames, radii)
@@ -297,7 +312,7 @@ def _draw_rotations(panel: Panel, curves: Sequence[Curve], matrices: Numbers, na
     for color, axis in zip(AXES, FRAME, strict=True):
         # For legends.
         rows.axes.plot([], [], color=color, linewidth=2.4, label=fresh(rows.axes, axis))
-    panel.explain("; ".join(filter(None, words)))
+    panel.explain("; ".join(filter(None, words)), rows.view_width)
     rows.draw_view()
 
     def body() -> Mover:
@@ -378,7 +393,7 @@ def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: FloatArray) -> N
     )
     inches = min(max(0.65 * REACH, min(REACH, rows.reach_between())) / across, 0.45 * rows.height / high)
     for i, (row, (times, symbols, radii)) in enumerate(
-        zip(rows.rows, rows.symbols(1.05 * inches * across), strict=True)
+        zip(rows.rows, rows.symbols(1.05 * inches * across, 2.0), strict=True)
     ):
         _draw_row(rows, i, inches, times, view @ symbols @ view.T, radii)
         if row.curve.is_mean and row.curve.batch is not None:
@@ -391,9 +406,9 @@ def _draw_ellipses(panel: Panel, curves: Sequence[Curve], view: FloatArray) -> N
     length = round_below(0.8 / inches)
     words = [f"half axes: √eigenvalues, bar: {length:g}", "arcs: front halves of principal sections" * (len(view) == 3)]
     words += ["colour: time" * (not curves[0].is_mean), rows.words]
-    text = "; ".join(filter(None, words))
-    panel.explain(fill(text, max(20, int((rows.width - 1.5) / 0.07))) if panel.mine else text)
-    _draw_bar(rows, inches * length, 1.15 if len(view) == 3 and panel.mine else 0.05)
+    right = rows.view_width if len(view) == 3 and panel.mine else 0.05
+    panel.explain("; ".join(filter(None, words)), right + inches * length + 0.1)
+    draw_bar(rows.axes, inches * length, right, 0.12 if panel.mine else -0.1)
     if len(view) == 3:
         rows.draw_view()
 
@@ -417,13 +432,13 @@ ELLIPSES, ELLIPSOIDS = (timeline(partial(_draw_ellipses, view=view), 3.6, in_row
 """The views of positive definite matrices of order 2 and 3."""
 
 
-def _draw_bar(rows: _Rows, length: float, right: float) -> None:
-    """Draw a bar of a length in inches above the axes or inside those of a user, ``right`` inches from their end."""
-    end, above = -right, 0.12 if rows.panel.mine else -0.1
-    tick = [[(x, above - 0.04), (x, above + 0.04)] for x in (end - length, end)]
-    look: Look = {"offsets": [(1, 1)], "offset_transform": rows.axes.transAxes, "clip_on": False, "in_layout": False}
-    look |= {"transform": _Inches(rows.axes), "colors": [ink()], "linewidths": 1.2}
-    rows.axes.add_collection(LineCollection([[(end - length, above), (end, above)], *tick], **look), autolim=False)
+def draw_bar(axes: Axes, length: float, right: float, above: float) -> None:
+    """Draw a bar of a length in inches, from the upper right corner of axes by inches to the left and upwards."""
+    tick = [[(x, above - 0.04), (x, above + 0.04)] for x in (-right - length, -right)]
+    look: Look = {"offsets": [(1, 1)], "offset_transform": axes.transAxes, "clip_on": False, "in_layout": False}
+    look |= {"transform": Inches(axes), "colors": [ink()], "linewidths": 1.2}
+    line = [(-right - length, above), (-right, above)]
+    axes.add_collection(LineCollection([line, *tick], **look), autolim=False)
 
 
 def _draw_row(

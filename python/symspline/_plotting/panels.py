@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,14 +22,31 @@ from numpy.typing import NDArray
 
 from .._base.typing import FloatArray, Look
 from .curves import Axis, Batch, Curve, common_gaps
-from .style import DATA, DOTTED, GAP, Indices, Numbers, axes_size, evenly, ink, note, plain, scale_of, show_dates
+from .style import (
+    DATA,
+    DOTTED,
+    GAP,
+    Indices,
+    Numbers,
+    axes_size,
+    evenly,
+    ink,
+    letters_in,
+    most_ticks,
+    note,
+    plain,
+    scale_of,
+    show_dates,
+    small,
+)
 
-FEW_KNOTS, _TICKS = 40, 300
-"""The largest numbers of knots that have lines, and ticks."""
+FEW_KNOTS, _LINED, _TICKS = 40, 12, 30
+"""The largest numbers of knots that are few, that have lines, and that have ticks, which is per inch."""
 _UNITS = (172_800, 86_400, "d"), (7200, 3600, "h"), (100, 60, "min"), (0, 1, "s")
 """The least number of seconds for which a unit is used, its length in seconds, and its name."""
-_WIDE = 7
-"""Width in inches of axes with more dates."""
+_WIDE, _DATE, _FEWEST = 7, 8, 3
+"""Width in inches of axes with more dates, the number of letters of a date, and the smallest largest number of dates
+for which the locator finds an interval."""
 
 
 @dataclass(frozen=True)
@@ -46,9 +64,14 @@ class Panel:
     axes: list[Axes]
     mine: bool
 
-    def explain(self, words: str) -> None:
-        """Explain symbols above axes with a time axis on a page, and below axes of the user."""
+    def explain(self, words: str, right: float = 0.0) -> None:
+        """Explain symbols above axes with a time axis on a page, and below axes of the user.
+
+        On a page, the words leave space for ``right`` inches of other symbols.
+        """
         if words and self.mine:
+            # The layout makes axes narrower than they are now.
+            words = fill(words, letters_in(0.85 * axes_size(self.axes[0])[0] - right))
             self.axes[0].set_title(words, loc="left", fontsize="small", weight="normal", pad=3)
         elif words:
             note(self.axes[0], words)
@@ -129,13 +152,13 @@ def time_axes(panel: Panel, curves: Sequence[Curve], labels: Sequence[str], mark
         axes.set_gid("time")
         axes.grid(visible=False, axis="x")
         axes.set_ylabel(label)
-        axes.yaxis.set_major_locator(
-            MaxNLocator(int(np.clip(height / 0.3, 4, 9)), steps=[1, 2, 2.5, 5, 10], min_n_ticks=3)
-        )
+        most = int(np.clip(36 * height / small(), 1, 9))
+        axes.yaxis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10], min_n_ticks=min(3, most)))
         axes.set_xlim(first - 0.01 * (last - first), last + 0.01 * (last - first))
         if axis.dates:
             # For some spans the locator does not find an interval between narrower limits.
-            show_dates(axes.xaxis, *((3, 10) if width > _WIDE else (2, 5)))
+            most = max(_FEWEST, min(10 if width > _WIDE else 5, most_ticks(width, _DATE)))
+            show_dates(axes.xaxis, 3 if width > _WIDE else min(2, most - 2), most)
         axes.set_xlabel(axis.name if is_lowest else "")
         axes.tick_params(labelbottom=is_lowest)
         axes.xaxis.offsetText.set_visible(is_lowest)
@@ -148,8 +171,8 @@ def time_axes(panel: Panel, curves: Sequence[Curve], labels: Sequence[str], mark
 def mark_knots(axes: Axes, curves: Sequence[Curve]) -> None:
     """Mark knots by thin lines, or by short ticks if lines would be too many. Noisy data have short ticks."""
     knots = np.unique(np.concatenate([curve.marks for curve in curves if not curve.faint]))
-    lines = len(knots) <= FEW_KNOTS and curves[0].noise is None
-    if len(knots) <= _TICKS:
+    lines = len(knots) <= _LINED and curves[0].noise is None
+    if len(knots) <= _TICKS * axes_size(axes)[0]:
         look: Look = {"transform": axes.get_xaxis_transform(), "color": ink(0.4), "linewidth": 0.8, "zorder": 1}
         look |= {"linestyle": DOTTED if lines else "-", "label": fresh(axes, curves[0].name_of_marks)}
         axes.vlines(knots, 0, 1.0 if lines else 0.04, **look)
@@ -188,7 +211,7 @@ SHADOW = "shadow on the floor"
 LEGEND = (
     *(START, END, DOTS, "given poses", "some of the poses", "poses of the curve", "control points", "data", *FRAME),
     *("frames", "95 %", FAR, SHADOW, AFTER, "curve in a gap", "gap", "limit", "single curves", "other curves"),
-    *("median", "5–95 %", "times of", "knots"),
+    *("median", "5–95 %", "residual", "times of", "knots"),
 )
 """How the labels of artists begin, in the order of the legend of a page, after names of curves."""
 LINE = "_curve"
@@ -274,7 +297,7 @@ def draw_dots(axes: Axes, curve: Curve, positions: FloatArray, **look: Any) -> N
         axes.plot(*positions.T, color=curve.color, label=fresh(axes, curve.label or "data"), **dots | look)
         return
     if curve.noise is not None:
-        dots |= {"markersize": float(np.clip(25 / np.sqrt(count), 1.5, 3.5)), "alpha": 0.75 if curve.alone else 0.4}
+        dots |= {"markersize": float(np.clip(30 / np.sqrt(count), 2.0, 4.0)), "alpha": 0.75 if curve.alone else 0.4}
         dots |= {"color": DATA if curve.alone else curve.color, "markeredgewidth": 0, "zorder": 3.5}
         axes.plot(*positions.T, label=fresh(axes, "data"), **dots | look)
         return
@@ -377,6 +400,9 @@ def draw_graph_of(
 
 def shade_quantiles(axes: Axes, batch: Batch, values: FloatArray) -> list[float]:
     """Fill the area between the 5 % and the 95 % quantile of numbers, one row per curve, and return its limits."""
+    if not np.isfinite(values).all():
+        # Single curves are drawn instead.
+        return []
     low, high = np.quantile(values, [0.05, 0.95], axis=0)
     label = fresh(axes, f"5–95 % of {batch.count} curves")
     axes.fill_between(batch.times, low, high, color=DATA, alpha=0.35, linewidth=0, label=label, zorder=1.5)

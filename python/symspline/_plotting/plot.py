@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from io import BytesIO
 from math import lcm
 from textwrap import fill
@@ -29,13 +29,15 @@ from .chart import Box
 from .curves import OTHERS, Axis, Curve, common_gaps, curves_of, scatter_of
 from .panels import FRAME, LEGEND, START, Panel, View
 from .rates import IN_ROW, columns_of, draw_rates, draw_residuals, is_angular, residuals_of
-from .style import DATA, distinct, font_factor, legend, scale_of, shrink, time_colors
+from .style import DATA, distinct, font_factor, least_factor, legend, scale_of, shrink, time_colors
 from .views import FACTORS, FRAMES, captions, title_on, view_of, views_of_factors
 
 _LARGEST = 200.0
 """The largest side of a figure in inches."""
 _METRICS = dict.fromkeys(("spd", "hpd", "sspd"), "affine-invariant") | {"logspd": "log-Euclidean"}
 """Metrics of families for which several are in use."""
+FigureSize = tuple[float, float | None]
+"""Width and height in inches; None if the height is chosen."""
 _MOVING = (".gif", ".mp4", ".apng", ".webm", ".mov", ".avi")
 
 
@@ -67,7 +69,7 @@ def page_of(
     label: str | None = None,
     radius: float | None = None,
     title: str | None = None,
-    figsize: tuple[float, float] | None = None,
+    figsize: FigureSize | None = None,
     show: bool = False,
 ) -> tuple[Figure, list[Curve]]:
     """Return the page of a curve, and the curves that it shows."""
@@ -141,8 +143,8 @@ def compare(
     for item, given, name, color in zip(items, data, names, chosen, strict=True):
         if given is None:
             made, _ = curves_of(item, axis, color, name, alone=False)
-            # Beside data, markers of starting points would be a second kind of circles.
-            drawn += [replace(curve, has_start=not has_data) for curve in made]
+            # Beside data, the points of curves would be a second kind of dots.
+            drawn += [replace(curve, has_start=False, has_nodes=False) if has_data else curve for curve in made]
         else:
             start, _, times, points = given
             drawn.append(scatter_of(space, start, times, points, axis, color, name))
@@ -255,7 +257,7 @@ def _draw_into(ax: Axes, curves: Sequence[Curve], title: str | None = None, show
 
 
 def draw_picture_into(
-    ax: Any, projection: str | None, draw: Callable[[Panel], None], title: str | None, show: bool
+    ax: Any, projection: str | None, draw: Callable[[Panel], object], title: str | None, show: bool
 ) -> Any:
     """Draw a picture into axes of the user, whose limits then contain what was there, too."""
     wanted = projection or "rectilinear"
@@ -374,29 +376,33 @@ def _checked_color(color: object, name: str) -> Any:
     return color
 
 
-def _checked_size(figsize: Any) -> tuple[float, float]:
+def _checked_size(figsize: Any) -> FigureSize:
+    """Return width and height; None for the height if the width alone is given."""
     size = as_array(figsize, "figsize")
-    valid = size.shape == (2,) and size.dtype.kind in "iuf"
+    valid = size.shape in ((), (2,)) and size.dtype.kind in "iuf"
     if not (valid and np.isfinite(size).all() and (size > 0).all() and (size <= _LARGEST).all()):
         raise ValidationError(
-            f"figsize must be width and height in inches, two positive numbers up to {_LARGEST:g}, not "
+            f"figsize must be a width in inches, or width and height, positive numbers up to {_LARGEST:g}, not "
             f"{short_repr(figsize)}"
         )
-    return float(size[0]), float(size[1])
+    return (float(size), None) if size.ndim == 0 else (float(size[0]), float(size[1]))
 
 
 # ---- the page of curves: a heading, pictures of the space, and velocity and acceleration against time ----
 
 _DPI = 150
-_HEAD = 1.0
+_HEAD, _PADS = 1.0, 0.12
 _RATES_WIDTH, _RATE, _RESIDUAL, _LABELS = 5.8, 1.6, 1.35, 0.8
 """Width of rates beside a picture, heights of a rate and of a panel of residuals, and that of the labels of times."""
 _CELL = 4.8, 4.6
 """Width and height of a factor of a product."""
-_MAP = 4.6, 6.8
-"""Widths of a globe and of the map beside it."""
-_SMALLEST = 0.6
-"""Text is not reduced by less than this factor, unless there is no space for a page otherwise."""
+_MAP, _MAP_ABOVE = (4.6, 6.8), 1.75
+"""Widths of a globe and of the map beside it, and how much higher the picture is if the globe is above the map."""
+_THINNEST, _LOWEST = 0.55, 0.62
+"""The smallest factors of lines and symbols, and of the heights of panels, if a page is small."""
+_STACKED, _CELL_WIDTH = 0.55, 1.65
+"""Pages narrower than this part of their usual width have pictures and rates one below the other, in columns of at
+least this width in inches."""
 _TICKS = [f"{x}tick.major.{name}" for x in "xy" for name in ("pad", "size")]
 _TEXT: Any = ("font.size", "axes.labelpad", "axes.titlepad", *_TICKS)
 
@@ -410,17 +416,58 @@ class CurveFigure(Figure):
         return buffer.getvalue()
 
 
+@dataclass(frozen=True)
+class Sheet:
+    """The size of a page.
+
+    Attributes
+    ----------
+    width : float
+        Width in inches, divided by the factor of a large font.
+    height : float or None
+        Likewise; None if it is chosen.
+    share : float
+        Part of the usual width, at most 1.
+    """
+
+    width: float
+    height: float | None
+    share: float
+
+    @classmethod
+    def of(cls, usual: float, figsize: FigureSize | None) -> Sheet:
+        """Return the page with a usual width, or the size that the user wants."""
+        width, height = (usual, None) if figsize is None else figsize
+        larger = 1.0 if figsize is None else font_factor()
+        width, height = width / larger, height and height / larger
+        return cls(width, height, min(1.0, width / usual))
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether pictures and rates are one below the other."""
+        return self.share < _STACKED and (self.height is None or self.height >= self.width)
+
+    @property
+    def text(self) -> float:
+        """Factor of the size of text on a page with enough height."""
+        return max(self.share, least_factor())
+
+    def scaled(self, heights: Sequence[float]) -> list[float]:
+        """Return heights of panels on this page."""
+        return [max(self.share, _LOWEST) * height for height in heights]
+
+
 @contextmanager
-def drawing(natural: tuple[float, float], figsize: tuple[float, float] | None, show: bool) -> Iterator[Figure]:
+def drawing(sheet: Sheet, height: float, show: bool) -> Iterator[Figure]:
     """Create a figure to draw into, which belongs to pyplot only if a window opens.
 
-    Lines, symbols and text are reduced if the figure is smaller than its natural size, in inches. That size is larger
-    for users with a large font.
+    Lines, symbols and text are reduced if the figure is narrower than usual or lower than ``height``, in inches. It is
+    larger for users with a large font. A height that is chosen contains the whole heading.
     """
     larger = font_factor()
-    size = np.multiply(natural, larger) if figsize is None else np.asarray(figsize, float)
-    share = float((size / np.multiply(natural, larger)).min())
-    factor = min(1.0, max(share, min(_SMALLEST, 1.4 * share)))
+    size = larger * np.array([sheet.width, sheet.height or height])
+    share = min(sheet.share, (sheet.height or height) / height)
+    factor = max(share, least_factor())
     look: Look = {"figsize": tuple(size.tolist()), "layout": "constrained"}
     with rc_context({name: factor * rcParams[name] for name in _TEXT}):
         if show:
@@ -430,15 +477,25 @@ def drawing(natural: tuple[float, float], figsize: tuple[float, float] | None, s
         else:
             figure = CurveFigure(dpi=_DPI, **look)
         yield figure
-    if factor * larger != 1:
-        shrink(figure.findobj(), factor * larger)
+    if sheet.height is None and sheet.share < 1:
+        figure.set_figheight(float(size[1]) + max(0.0, heading_height(figure) - larger * _HEAD * sheet.text))
+    thinner = max(share, _THINNEST) * larger
+    if thinner != 1:
+        shrink(figure.findobj(), thinner)
+
+
+def heading_height(figure: Figure) -> float:
+    """Return the height in inches of the title, the description and the legend of a page."""
+    whole: Any = figure
+    parts = [whole._suptitle, *(legend for body in figure.subfigs for legend in body.legends)]
+    return float(sum(part.get_window_extent().height for part in parts) / figure.dpi + _PADS)
 
 
 def draw_page(
     curves: list[Curve],
     title: str,
     words: str,
-    figsize: tuple[float, float] | None = None,
+    figsize: FigureSize | None = None,
     show: bool = False,
     residuals: Sequence[Any] = (),
 ) -> Figure:
@@ -452,31 +509,43 @@ def draw_page(
     else:
         whole = view_of(curves)
         pictures, names, rows, across = [(whole, curves)], [], 1, 1
-    columns = columns_of(curves[0], curves[0].axis.seconds, FACTORS, whole.is_wide)
+    seconds = curves[0].axis.seconds
+    sheet = Sheet.of(whole.width + (0 if whole.is_wide else _RATES_WIDTH), figsize)
+    wide, is_map = whole.is_wide or sheet.is_narrow, not pictures[0][0].is_time and pictures[0][0].rows > 1
+    high = whole.height
+    if sheet.is_narrow:
+        # As many pictures in a row as have space, or a globe above its map.
+        least = _CELL_WIDTH * (1 if all(view.is_time and not view.in_rows for view, _ in pictures) else 2)
+        across = min(across, max(1, int(sheet.width / least)))
+        rows = -(-len(pictures) // across)
+        high = _CELL[1] * rows if names else high * (_MAP_ABOVE if is_map else 1)
+        if not whole.is_wide and not names:
+            high *= sheet.width / (whole.width * max(sheet.share, _LOWEST))
+    columns = columns_of(curves[0], seconds, FACTORS, wide, across if names else IN_ROW)
     count = max(map(len, columns), default=0)
-    beside, below = (0, count) if whole.is_wide else (count, 0)
+    beside, below = (0, count) if wide else (count, 0)
     # Wide pages have cells of one grid, so that time axes one below the other are aligned. A picture has some of them.
-    units = lcm(*(view.rows for view, _ in pictures if view.is_time)) if whole.is_wide else 1
+    units = lcm(*(view.rows for view, _ in pictures if view.is_time)) if wide else 1
     bottom = lcm(*map(len, columns)) if below else 0
-    high = max(whole.height, _LABELS + _RATE * beside)
+    high = max(high, _LABELS + _RATE * beside)
     heights = [high / (rows * units)] * rows * units + [(_LABELS + _RATE * below) / max(bottom, 1)] * bottom
-    heights += [_RESIDUAL] * len(residuals)
+    heights = sheet.scaled(heights + [_RESIDUAL] * len(residuals))
     cells = lcm(across, len(columns)) if below else across
     widths = [whole.width / cells] * cells + [_RATES_WIDTH] * bool(beside)
-    with drawing((sum(widths), _HEAD + sum(heights)), figsize, show) as figure:
+    with drawing(sheet, _HEAD * sheet.text + sum(heights), show) as figure:
         body: Any = figure.subfigures()
         grid = GridSpec(len(heights), len(widths), body, width_ratios=widths, height_ratios=heights, **_ABOUT)
 
         def stack(top: int, height: int, left: int, width: int, number: int, projection: Any = None) -> list[Axes]:
             """Add axes one below the other that fill some of the cells, or divide them."""
             step = height // number
-            if whole.is_wide and step:
+            if wide and step:
                 places: Any = [grid[i : i + step, left : left + width] for i in range(top, top + height, step)]
             else:
                 inner = grid[top : top + height, left : left + width].subgridspec(number, 1)
                 places = [inner[i, 0] for i in range(number)]
             made = [body.add_subplot(place, axes_class=Box if projection else None) for place in places]
-            if not whole.is_wide:
+            if not wide:
                 body.align_ylabels(made)
             return made
 
@@ -484,8 +553,10 @@ def draw_page(
             row, column = divmod(i, across)
             place = row * units, units, column * cells // across, cells // across
             if view.rows > 1 and not view.is_time:
-                inner = grid[:units, :cells].subgridspec(1, view.rows, width_ratios=_MAP)
-                axes = [body.add_subplot(inner[0, k]) for k in range(view.rows)]
+                shape = (view.rows, 1) if sheet.is_narrow else (1, view.rows)
+                ratios: Look = {"height_ratios": _MAP[::-1]} if sheet.is_narrow else {"width_ratios": _MAP}
+                inner = grid[:units, :cells].subgridspec(*shape, **ratios)
+                axes = [body.add_subplot(inner[k]) for k in range(view.rows)]
             else:
                 axes = stack(*place, view.rows, view.projection)
             view.draw_into(Panel(axes, mine=True), drawn)
@@ -498,7 +569,7 @@ def draw_page(
         if residuals:
             place = rows * units + bottom, len(residuals), 0, len(widths)
             draw_residuals(stack(*place, len(residuals)), curves[0], residuals)
-        if whole.is_wide:
+        if wide:
             body.align_ylabels([axes for axes in body.axes if axes.get_gid() == "time"])
         head(figure, body, title, words, curves)
     return figure
@@ -510,8 +581,9 @@ _ABOUT: Look = {"left": 0.07, "right": 0.97, "bottom": 0.07, "top": 0.9, "hspace
 
 def _caption(axes: Any, name: str) -> None:
     """Write the name of a factor above its picture, and above explanations that the picture has there."""
-    top = max(artist.get_window_extent().y1 for artist in (axes._left_title, axes.get_legend()) if artist is not None)
-    above = 72 * (top - axes.bbox.y1) / axes.figure.dpi + 4
+    above = axes._left_title, axes.get_legend(), *axes.texts
+    top = max(artist.get_window_extent().y1 for artist in above if artist is not None)
+    above = 72 * (top - axes.bbox.y1) / axes.figure.dpi + 6
     look: Look = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "fontsize": "large"}
     axes.annotate(name, (0.5, 1), (0, above), **look)
 

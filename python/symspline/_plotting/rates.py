@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from textwrap import fill
 from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, NullLocator
 
 from .._base.typing import FloatArray, Look
@@ -15,7 +15,7 @@ from .._curves.curve import SidePanel
 from .._spaces import AnySpace, Euclidean, Product, SpecialEuclidean, Sphere, Torus, cover_of, factors_of, short_name
 from .curves import Curve
 from .panels import ALPHA, FEW_KNOTS, LINE, Panel, fill_band, fresh, plot_line, shade_quantiles, time_axes
-from .style import DATA, MARK, axes_size, distinct, ink, legend
+from .style import DATA, MARK, axes_size, distinct, ink, letters_in
 
 NORMAL = 1.96
 """Half width of the 95 % interval of a normal distribution, in standard deviations."""
@@ -101,26 +101,36 @@ def is_angular(space: AnySpace) -> bool:
 def rates_of(space: AnySpace, seconds: bool) -> list[Rate]:
     """Return the rates of a space that is not a product."""
     cover = cover_of(space)
-    per = [", 1/s", ", 1/s²"] if seconds else ["", ""]
+    per, unit = [", 1/s", ", 1/s²"] if seconds else ["", ""], 1.0
+    if isinstance(cover, Euclidean) and seconds:
+        per = [", units/s", ", units/s²"]
     if is_angular(space):
-        per = [", rad/s", ", rad/s²"] if seconds else [", rad/t", ", rad/t²"]
+        # Pictures of angles are in degrees.
+        in_degrees = isinstance(cover, Torus) or (str(cover) in _SIGNS and str(cover) != "torus:1")
+        unit = float(np.degrees(1.0)) if in_degrees else 1.0
+        name, time = "°" if in_degrees else "rad", "s" if seconds else "t"
+        per = [f", {name}/{time}", f", {name}/{time}²"]
     more = [" = |ω|/2", " = |ω′|/2"] if str(cover) in QUATERNIONS else [" of states" * (str(cover) in _STATES)] * 2
     if isinstance(cover, SpecialEuclidean):
         return _rates_of_poses(cover, seconds)
     sign = _SIGNS.get(str(cover))
     if sign is None:
         return [
-            Rate(f"speed\n|γ′|{more[0]}{per[0]}", 1, lambda at: at("speed")),
-            Rate(f"acceleration\n|∇γ′|{more[1]}{per[1]}", 2, lambda at: at("bend")),
+            Rate(f"speed\n|γ′|{more[0]}{per[0]}", 1, lambda at: unit * at("speed"), scale=unit),
+            Rate(f"acceleration\n|∇γ′|{more[1]}{per[1]}", 2, lambda at: unit * at("bend"), scale=unit),
         ]
     return [
-        Rate(f"velocity\nγ′{per[0]}", 1, lambda at: np.copysign(at("speed"), sign(at("point"), at("velocity"))), True),
         Rate(
-            f"acceleration\n∇γ′{per[1]}",
-            2,
-            lambda at: np.copysign(at("bend"), sign(at("point"), at("acceleration"))),
+            f"{name}\n{symbol}{per[order - 1]}",
+            order,
+            lambda at, size=size, vector=vector: unit * np.copysign(at(size), sign(at("point"), at(vector))),  # type: ignore[misc]
             True,
-        ),
+            unit,
+        )
+        for order, name, symbol, size, vector in (
+            (1, "velocity", "γ′", "speed", "velocity"),
+            (2, "acceleration", "∇γ′", "bend", "acceleration"),
+        )
     ]
 
 
@@ -133,7 +143,7 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     """
     n = space.point_shape[0] - 1
     turn = ["rad/s", "rad/s²"] if seconds else ["rad/t", "rad/t²"]
-    move = [", 1/s", ", 1/s²"] if seconds else ["", ""]
+    move = [", units/s", ", units/s²"] if seconds else ["", ""]
 
     def turning(quantity: str) -> Callable[[At], FloatArray]:
         if n == 2:
@@ -159,11 +169,13 @@ def _rates_of_poses(space: SpecialEuclidean, seconds: bool) -> list[Rate]:
     return [rate._replace(whole=False, speed=speed) for rate, speed in zip(rates, speeds, strict=True)]
 
 
-def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[tuple[int | None, Rate]]]:
+def columns_of(
+    curve: Curve, seconds: bool, most: int, wide: bool, in_row: int = IN_ROW
+) -> list[list[tuple[int | None, Rate]]]:
     """Return the rates of a curve in columns, with the number of the factor of a product.
 
-    In wide figures, turning and moving have a column each, and so have up to three factors, below their pictures. More
-    of them have one for velocities and one for accelerations.
+    In wide figures, turning and moving have a column each, and so have up to ``in_row`` factors, below their pictures.
+    More of them have one for velocities and one for accelerations, or one for all if pictures are not in rows.
     """
     space = curve.space
     if curve.radius is not None and not isinstance(space, Product):
@@ -171,13 +183,14 @@ def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[
     if not isinstance(space, Product):
         rates: list[tuple[int | None, Rate]] = [(None, rate) for rate in rates_of(space, seconds)]
         if curve.is_mean and not isinstance(cover_of(space), SpecialEuclidean):
-            rates.insert(0, (None, _deviation(curve, ", rad" * ("rad" in rates[0][1].label))))
+            unit = next((unit for unit in ("rad", "°") if f", {unit}/" in rates[0][1].label), "")
+            rates.insert(0, (None, _deviation(curve, f", {unit}" * bool(unit), rates[0][1].scale)))
             return [rates]
         return [rates[:2], rates[2:]] if wide and len(rates) > 2 else [rates]
     factors = factors_of(space)
     parts = [curve.part(i) for i in range(min(most, len(factors)))]
     by_factor = [rates_of(part.space, seconds) if part.radius is None else _on_earth(part, seconds) for part in parts]
-    if wide and len(by_factor) <= IN_ROW:
+    if wide and len(by_factor) <= in_row:
         return [[(i, rate) for rate in group] for i, group in enumerate(by_factor)]
     names = [_cut(short_name(factor)) for factor in factors]
     if len(set(names)) < len(names):
@@ -185,7 +198,7 @@ def columns_of(curve: Curve, seconds: bool, most: int, wide: bool) -> list[list[
     rows: list[tuple[int | None, Rate]] = [
         (i, rate._replace(label=f"{rate.label} of {names[i]}")) for i, group in enumerate(by_factor) for rate in group
     ]
-    return [[row for row in rows if row[1].order == order] for order in (1, 2)] if wide else [rows]
+    return [[row for row in rows if row[1].order == order] for order in (1, 2)] if wide and in_row > 1 else [rows]
 
 
 def _cut(name: str) -> str:
@@ -272,6 +285,11 @@ def _draw_values(axes: Axes, curve: Curve, rate: Rate) -> list[float]:
     if deviation is None:
         # Without data or a band, a smooth line would look like a measurement.
         values = curve.outside_gaps(values)
+    if rate.order == 2 and curve.noise is not None and isinstance(cover_of(curve.space), SpecialEuclidean):
+        # The position of smoothed poses has no acceleration at natural ends, but the curve through them has no change
+        # of its twist. It adapts within one segment.
+        knots = np.asarray(curve.data.times)
+        values = np.where((curve.x < knots[1]) | (curve.x > knots[-2]), np.nan, values)
     spread = 0.0 if deviation is None else rate.scale * NORMAL * deviation
     low, high = values - spread, values + spread
     low = low if rate.signed or deviation is None else np.maximum(low, 0)
@@ -320,6 +338,7 @@ def draw_residuals(axes: list[Axes], curve: Curve, panels: Sequence[SidePanel]) 
     time_axes(Panel(axes, mine=True), [curve], [panel.label for panel in panels], marked=False)
     for one, panel in zip(axes, panels, strict=True):
         words = _DRAWN[panel.kind](one, curve, panel)
+        words = fill(words, letters_in(axes_size(one)[0]))
         one.set_title(words, loc="right", fontsize="small", weight="normal", pad=3)
 
 
@@ -367,21 +386,16 @@ def _draw_deviations(axes: Axes, curve: Curve, panel: SidePanel) -> str:
     axes.axhspan(-NORMAL, NORMAL, facecolor=curve.color, alpha=0.08, linewidth=0, zorder=0.6)
     axes.axhline(0.0, color=ink(0.4), linewidth=0.8, zorder=1)
     look: Look = {"linestyle": "none", "markeredgewidth": 0, "zorder": 3, "rasterized": values.size > 5000}
-    size = float(np.clip(40 / np.sqrt(values.size), 1.2, 3.5))
+    size = float(np.clip(40 / np.sqrt(values.size), 2.2, 4.0))
     colors = distinct() if panel.names else [DATA]
-    handles = []
     for k, column in enumerate(values.T):
         look["color"] = colors[k % len(colors)]
         kept = np.abs(column) <= top
-        handles += axes.plot(times[kept], column[kept], marker="o", markersize=size, alpha=0.6, **look)
+        label = f"residual in {panel.names[k]}" if panel.names else "_residual"
+        axes.plot(times[kept], column[kept], marker="o", markersize=size, alpha=0.6, label=label, **look)
         for sign, marker in ((1, "^"), (-1, "v")):
             far = sign * column > top
             axes.plot(times[far], np.full(int(far.sum()), 0.95 * sign * top), marker=marker, markersize=6, **look)
-    if panel.names:
-        keys = [
-            Line2D([], [], linestyle="none", marker="o", markersize=5, color=panel.get_color()) for panel in handles
-        ]
-        legend(axes, keys, panel.names, axes_size(axes)[0], loc="lower left", bbox_to_anchor=(0, 1))
     words = f"{100 * np.mean(sizes > NORMAL):.1f} % beyond ±{NORMAL} (5 % expected)"
     beyond = int((sizes > top).sum())
     return words + (f"; {beyond} beyond the axis (triangles)" if beyond else "")

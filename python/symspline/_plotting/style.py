@@ -41,6 +41,12 @@ _FAR = 1e3
 SUBSCRIPTS = str.maketrans("0123456789,", "₀₁₂₃₄₅₆₇₈₉,")
 _FULL = 3.2
 """The shorter side in inches of axes whose symbols have their full size."""
+SMALLEST = 6.0
+"""The smallest size of letters in points that pages have, as journals require, unless the usual font is smaller."""
+_SMALL_SHARE = 0.833
+"""Size of text that matplotlib calls small, as a part of the usual size."""
+_LETTER = 0.0078
+"""Mean width of a letter in inches, per point of its size."""
 DATES: Any = dates
 """The module of matplotlib, which has no types."""
 
@@ -94,6 +100,29 @@ def font_factor() -> float:
     return max(1.0, float(rcParams["font.size"]) / 10)
 
 
+def least_factor() -> float:
+    """Return the factor by which text may be reduced, so that small text has the smallest size that is allowed."""
+    return min(1.0, SMALLEST / (_SMALL_SHARE * float(rcParams["font.size"])))
+
+
+def small() -> float:
+    """Return the size of small text in points."""
+    return _SMALL_SHARE * float(rcParams["font.size"])
+
+
+def letters_in(inches: float) -> int:
+    """Return the number of letters of small text that fit into a width."""
+    return max(10, int(inches / (_LETTER * small())))
+
+
+def most_ticks(inches: float, letters: float) -> int:
+    """Return the largest number of ticks whose labels, with so many letters, have space between them.
+
+    The layout makes axes narrower than they are now.
+    """
+    return max(1, int(0.8 * inches / (_LETTER * small() * (letters + 2))))
+
+
 def axes_size(axes: Axes) -> tuple[float, float]:
     """Return width and height of axes in inches."""
     box, figure = axes.get_window_extent(), axes.get_figure(root=True)
@@ -123,10 +152,9 @@ def shrink(artists: Iterable[Artist], factor: float) -> None:
 
 def note(axes: Any, text: str) -> None:
     """Write lines below a picture."""
-    size = float(rcParams["font.size"])
     beside = float(axes.xaxis.label.get_fontsize())
     below = -4 if not axes.axison else -2 * beside if axes.name == "3d" else -2.7 * beside - 8
-    text = "\n".join(fill(line, max(24, int(axes_size(axes)[0] / (0.0065 * size)))) for line in text.splitlines())
+    text = "\n".join(fill(line, max(24, letters_in(axes_size(axes)[0]))) for line in text.splitlines())
     look: Look = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center", "va": "top"}
     axes.annotate(text, (0.5, 0), (0, below), fontsize="small", **look)
 

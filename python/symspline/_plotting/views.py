@@ -92,7 +92,7 @@ def views_of_factors(curves: Sequence[Curve]) -> list[tuple[View, list[Curve]]]:
 
 def captions(space: AnySpace) -> list[str]:
     """Return names of the factors of a product, with what their points are, and numbers if several are equal."""
-    names = [", ".join(filter(None, (repr(factor), _points_of_factor(factor)))) for factor in factors_of(space)]
+    names = [", ".join(filter(None, (short_name(factor), _points_of_factor(factor)))) for factor in factors_of(space)]
     several = max(Counter(names).values()) > 1
     return [f"factor {i}: {name}" if several else name for i, name in enumerate(names)]
 
@@ -102,17 +102,16 @@ def _points_of_factor(space: AnySpace) -> str:
 
 
 def title_on(what: str, space: AnySpace, most: int = 63) -> str:
-    """Return the title of a figure, in at most ``most`` letters.
+    """Return the title of a figure, in at most ``most`` letters, with the name of the space that the user can type.
 
-    Long titles have the short name of the space, and those of products have none, because captions name the factors.
+    Long titles of products have none, because captions name the factors.
     """
     words = [_points_of_factor(text) for text in factors_of(space)]
     points = _entry(space)[1]
     if isinstance(space, Product):
         points = " and ".join(dict.fromkeys(words)) if all(words) else ""
-    names = [" × ".join(map(repr, factors_of(space))), short_name(space)]
     kinds = [f"{what} of {points}"] * bool(points) + [what]
-    titles = [f"{kind} on {name}" for kind in kinds for name in names]
+    titles = [f"{kind} on {short_name(space)}" for kind in kinds]
     if isinstance(space, Product) and len(kinds) > 1:
         titles.insert(1, kinds[0])
     return next((text for text in titles if len(text) <= most), shorten(titles[-1], most, placeholder=" …"))

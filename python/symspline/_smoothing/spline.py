@@ -922,7 +922,12 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
             return []
         panels = [
             SidePanel(
-                f"95 % band\nof {part}{', rad' if part in _TURNING else ''}", x, values[:, None], (), number, "radii"
+                f"95 % band\nof {short_name(part)}{', rad' if part in _TURNING else ''}",
+                x,
+                values[:, None],
+                (),
+                number,
+                "radii",
             )
             for number, radii in enumerate(self._radii((), x))
             for part, values in radii
@@ -932,7 +937,7 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
     def _panels_of_varying(self, x: Doubles) -> list[SidePanel]:
         """Return λ of the segments and the standard deviation of the noise at times x, where they vary."""
         knots, spaces = self._knots_of(()), smoothed_spaces(self.space)
-        names = [f"\nof {space}" if len(spaces) > 1 else "" for space in spaces]
+        names = [f"\nof {short_name(space)}" if len(spaces) > 1 else "" for space in spaces]
         power = "⁵" if self._smoothed[0].penalty == "jerk" else "³"
         unit = "" if self._time_axis.plain else f", s{power}"
         panels = []

@@ -1174,7 +1174,7 @@ class Curve(ABC, Generic[P]):
         color: str | tuple[float, ...] | None = None,
         label: str | None = None,
         title: str | None = None,
-        figsize: tuple[float, float] | None = None,
+        figsize: tuple[float, float] | float | None = None,
         show: bool = False,
     ) -> Figure | Axes:
         """Plot the curve, its velocity and its covariant acceleration.
@@ -1218,8 +1218,9 @@ class Curve(ABC, Generic[P]):
             Name of the curve in legends.
         title : str, optional
             Title of the figure, or of `ax`.
-        figsize : pair of float, optional
-            Width and height of the figure in inches. Text is smaller on a page that is smaller than the default.
+        figsize : float or pair of float, optional
+            Width of the figure in inches, with the height that all panels need, or width and height. Letters have at
+            least 6 points on any page, unless your font is smaller.
         show : bool, default False
             Whether to open a window by pyplot, in which you can rotate three-dimensional pictures.
 
@@ -1285,7 +1286,7 @@ class Curve(ABC, Generic[P]):
         fps: float = 15,
         color: str | tuple[float, ...] | None = None,
         title: str | None = None,
-        figsize: tuple[float, float] | None = None,
+        figsize: tuple[float, float] | float | None = None,
     ) -> FuncAnimation:
         """Animate the motion along the curve.
 
@@ -1304,8 +1305,8 @@ class Curve(ABC, Generic[P]):
             Colour of the curve.
         title : str, optional
             Title of the figure.
-        figsize : pair of float, optional
-            Width and height of the figure in inches.
+        figsize : float or pair of float, optional
+            Width of the figure in inches, or width and height.
 
         Returns
         -------
@@ -1518,7 +1519,7 @@ def plot(
     colors: Sequence[Color] | None = None,
     ax: None = None,
     title: str | None = None,
-    figsize: tuple[float, float] | None = None,
+    figsize: tuple[float, float] | float | None = None,
     show: bool = False,
 ) -> Figure: ...
 @overload
@@ -1541,7 +1542,7 @@ def plot(
     colors: Sequence[Color] | None = None,
     ax: Axes | None = None,
     title: str | None = None,
-    figsize: tuple[float, float] | None = None,
+    figsize: tuple[float, float] | float | None = None,
     show: bool = False,
 ) -> Figure | Axes:
     """Compare curves and data in one picture.
@@ -1561,8 +1562,8 @@ def plot(
         Axes into which the picture is drawn, without further panels; see `Curve.plot`.
     title : str, optional
         Title of the figure, or of `ax`.
-    figsize : pair of float, optional
-        Width and height of the figure in inches.
+    figsize : float or pair of float, optional
+        Width of the figure in inches, or width and height.
     show : bool, default False
         Whether to open a window by pyplot.
 
