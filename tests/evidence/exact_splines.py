@@ -10,9 +10,10 @@ and likewise from the other end. Equation (e) of `docs/theorem.md`, multiplied b
 
     S(v₋) (w₊ − v₊)/h₊² = S(v₊) (w₋ + v₋)/h₋² .
 
-Newton's method solves these equations to 30 digits. The interval method of Krawczyk (R. E. Moore, R. B. Kearfott and
-M. J. Cloud, *Introduction to Interval Analysis*, 2009, section 8.2) then proves that a box around the result contains
-exactly one zero. Residuals are intervals of mpmath. Derivatives are floating-point numbers with bounds of their errors.
+Newton's method solves these equations to 30 significant digits. The interval method of Krawczyk (R. E. Moore, R. B.
+Kearfott and M. J. Cloud, *Introduction to Interval Analysis*, 2009, section 8.2) then proves that a box around the
+result contains exactly one zero. Residuals are intervals of mpmath. Derivatives are floating-point numbers with
+bounds of their errors.
 """
 
 import itertools
@@ -23,7 +24,7 @@ import numpy as np
 from mpmath import iv, mp
 
 EPS = np.finfo(float).eps
-# Digits of the solution and of the intervals.
+# Significant digits of the solution and of the intervals.
 DIGITS = 40
 # The half-width of the box.
 WIDTH = 1e-25
@@ -235,7 +236,7 @@ class Vectors(Space):
     def frame(self, point):
         """A matrix of the group that moves the origin to the point, and its inverse."""
         if self.curvature < 0:
-            # The boost: columns that are orthonormal as they stand, where Gram and Schmidt would lose digits.
+            # The boost: columns that are orthonormal as they stand, where Gram and Schmidt would lose accuracy.
             point = point / iv.sqrt(-(self.metric * point * point).sum())
             frame = intervals(np.eye(self.size))
             frame[:, 1:] += (point + frame[:, 0])[:, None] * point[1:] / (1 + point[0])
@@ -444,7 +445,7 @@ class Curve:
             jet = self.derivative(z)
             z -= np.linalg.solve(jet.mid[1:].T, jet.mid[0])
         inverse = np.linalg.inv(jet.mid[1:].T)
-        # One more step doubles the number of digits.
+        # One more step doubles the number of significant digits.
         z = np.vectorize(lambda x: number(mp.mpf, x), otypes=[object])(z)
         z = z - inverse.astype(object) @ np.concatenate(self.residual(self.columns(z), midpoints))[:, 0]
         self.prove(z)
