@@ -39,9 +39,9 @@ def blocks(readme: Path, language: str) -> list[str]:
     return found
 
 
-def run(*command: str | Path, cwd: Path, **settings: str) -> None:
+def run(*command: str | Path, cwd: Path) -> None:
     """Run a command, which must succeed."""
-    subprocess.run(command, cwd=cwd, env=ENVIRONMENT | settings, check=True)
+    subprocess.run(command, cwd=cwd, env=ENVIRONMENT, check=True)
 
 
 def python(folder: Path) -> None:
@@ -83,9 +83,8 @@ def rust(folder: Path) -> None:
     (folder / "src/bin").mkdir(parents=True)
     for k, block in enumerate(blocks(readme, "rust")):
         (folder / f"src/bin/readme_{k}.rs").write_text(block, "utf-8")
-        # Crates from the registry stay compiled for the next time.
-        target = str(ROOT / "target/packages")
-        run("cargo", "run", "--quiet", "--bin", f"readme_{k}", cwd=folder, CARGO_TARGET_DIR=target)
+        # A new target folder: files in packages all have one date, by which cargo would not see that they changed.
+        run("cargo", "run", "--quiet", "--target-dir", "target", "--bin", f"readme_{k}", cwd=folder)
 
 
 def javascript(folder: Path) -> None:
