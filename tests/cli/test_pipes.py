@@ -3,6 +3,7 @@
 import gzip
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -202,3 +203,16 @@ def test_numbers_in_text_read_back_equal(run):
 
 def test_digits_are_checked(curves, fails):
     assert "--digits: 0: give a number between 1 and 17 (see" in fails("sample a.npz -n 3 --digits 0 -o b.csv")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="descriptors are closed by a shell")
+@pytest.mark.parametrize(
+    "line, says", [("fit - --lonlat -o a.npz <&-", "input"), ("fit a.csv --lonlat -o - >&-", "output")]
+)
+def test_streams_that_are_closed(line, says):
+    write("a.csv", TRACK)
+    command = f'"{sys.executable}" -m symspline {line}'
+    done = subprocess.run(
+        ["/bin/sh", "-c", command], capture_output=True, text=True, timeout=60, stdin=subprocess.DEVNULL
+    )
+    assert (done.returncode, done.stderr) == (2, f"symspline: standard {says} is closed; give the name of a file\n")

@@ -1,5 +1,6 @@
 """Curves near noisy points: ``fit --smooth``."""
 
+import re
 import warnings
 
 import numpy as np
@@ -49,7 +50,7 @@ def test_a_noisy_track(run, line, options):
     report = expected.report
     assert out == (
         f"a.npz: 1 curve near 60 points of sphere:2, converged: λ {report.lam:.3g}, {report.df:.3g} degrees of "
-        f"freedom, noise {np.degrees(report.sigma):.3g}°\n"
+        f"freedom, noise {np.degrees(report.sigma):.3g}° ({6_371_008.8 * report.sigma:.3g} m)\n"
     )
     run("sample a.npz -n 5 -o b.csv")
     assert np.abs(numbers(table("b.csv"), "lon", "lat")[0] - [LON[0], LAT[0]]).max() < 0.05
@@ -307,3 +308,19 @@ def test_an_outlier_that_pulls_the_curve_is_found(run):
     write_table("a.csv", {"t": t, "x": x})
     out = run("fit a.csv --space r:1 --smooth -o a.npz", notes=True)
     assert "line 42: the point is probably an outlier, " in out
+
+
+def test_noise_on_the_earth_is_also_a_distance(run):
+    t = np.arange(60)
+    rng = np.random.default_rng(0)
+    for name, scale, unit in (("a", 1e-4, "m"), ("b", 0.1, "km")):
+        lon, lat = np.c_[t / 10, np.sin(t / 9)].T + scale * rng.standard_normal((2, 60))
+        write_table(f"{name}.csv", {"t": t, "lon": lon, "lat": lat})
+        said = run(f"fit {name}.csv --lonlat --smooth --sigma {scale} -o {name}.npz")
+        angle, distance = re.search(r"noise (\S+)° \((\S+) (?:m|km)\)", said).groups()
+        assert f" {unit})" in said and f"noise {angle}° ({distance} {unit})" in run(f"info {name}.npz")
+        assert float(distance) == pytest.approx(
+            np.radians(float(angle)) * 6371.0088 * (1 if unit == "km" else 1000), rel=0.01
+        )
+        # The picture has the same number.
+        assert f"noise {float(distance):.3g} {unit}" in ss.load(f"{name}.npz")._made_of(6_371_008.8)

@@ -896,10 +896,11 @@ class SmoothingSpline(CubicSpline[P, R], Generic[P, R]):
         factors = f" ({spaces})" if 1 < len(self._smoothed) <= _OWN_RANGES else ""
         df = _ranges([part.report.df for part in self._smoothed], 3)
         scales = [radius or 1 if part == Sphere(2) else 1 for part in smoothed_spaces(self.space)]
-        sigmas = [part.sigma * scale for part, scale in zip(self._smoothed, scales, strict=True)]
-        sigma = _ranges(sigmas, 3 if radius else 2)
+        sigmas = [part.report.sigma * scale for part, scale in zip(self._smoothed, scales, strict=True)]
+        kilometres = bool(radius) and max(float(np.max(values)) for values in sigmas) >= 1000
+        sigma = _ranges([values / 1000 if kilometres else values for values in sigmas], 3 if radius else 2)
         of_batch = " each" if self._batch else ""
-        unit = " m" if radius else ""
+        unit = (" km" if kilometres else " m") if radius else ""
         return f"{count} data{of_batch}, {df} degrees of freedom, noise {sigma}{unit}{factors}"
 
     def _noise_beside(self, index: Index, x: Doubles) -> UncertaintyBand:

@@ -68,6 +68,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _failed("there is not enough memory for this", BAD)
     except OSError as error:
+        if error.errno is None:
+            # Libraries raise such errors for files that they cannot read.
+            return _failed(f"a file cannot be read: {error}", BAD)
         if error.filename is None:
             _drop_output()
         return _failed(f"cannot write {error.filename or 'the output'}: {error.strerror or error}", BAD)
@@ -84,7 +87,8 @@ def _failed(message: object, code: int) -> int:
 
 def _drop_output() -> None:
     """Discard output that would be flushed at exit, as its reader has stopped."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if sys.stdout is not None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> _Parser:

@@ -31,10 +31,11 @@ from .._base.typing import Array
 from .._smoothing import SmoothingSpline
 from .._smoothing.noise import is_several, smoothed_spaces
 from .._smoothing.solve import Smoothed
-from .._spaces import Doubles
+from .._spaces import Doubles, Space
 from .._spaces.base import CLASSES, example_of
 from .._splines.cubic import CubicSpline
-from ._columns import JOINED, NUMBERED, Columns, column_of_blocks, column_of_names, in_degrees, time_column
+from ..geo import EARTH_RADIUS
+from ._columns import GLOBE, JOINED, NUMBERED, Columns, column_of_blocks, column_of_names, in_degrees, time_column
 from ._curves import read_curves
 from ._messages import Problem, Source, counted, listed, refuse
 from ._tables import TABLES, Rows, Table, endings, format_of, open_table
@@ -212,12 +213,24 @@ def _smoothed(splines: Sequence[SmoothingSpline[Any, Any]], columns: Columns) ->
     several = is_several(space)
     parts = zip(*(spline._smoothed for spline in splines), strict=True)
     return "; ".join(
-        _chosen(f"{part}: " if several else "", of_space, in_degrees(part, columns.lonlat, columns.degrees))
+        _chosen(f"{part}: " if several else "", of_space, *_units_of(part, columns))
         for part, of_space in zip(smoothed_spaces(space), parts, strict=True)
     )
 
 
-def _chosen(name: str, parts: Sequence[Smoothed], degrees: bool) -> str:
+def _units_of(part: Space, columns: Columns) -> tuple[bool, bool]:
+    """Return whether the noise in a smoothed space is in degrees, and whether it is one of positions on the Earth."""
+    return in_degrees(part, columns.lonlat, columns.degrees), columns.lonlat and part == GLOBE
+
+
+def _on_ground(sigmas: Sequence[float]) -> str:
+    """Return angles in radians as distances on the Earth, in kilometres from 1000 metres on."""
+    metres = [EARTH_RADIUS * sigma for sigma in sigmas]
+    far = max(metres) >= 1000
+    return f" ({_spread([metre / 1000 if far else metre for metre in metres])} {'km' if far else 'm'})"
+
+
+def _chosen(name: str, parts: Sequence[Smoothed], degrees: bool, earth: bool) -> str:
     reports = [part.report for part in parts]
     lam_varies, noise_varies = (_varying([getattr(part, name) for part in parts]) for name in _PROFILES)
     varying = [part.report for part in parts if part.profile is not None or part.noise_profile is not None]
@@ -232,6 +245,7 @@ def _chosen(name: str, parts: Sequence[Smoothed], degrees: bool) -> str:
     return (
         f"{name}λ {_spread([report.lam for report in reports])}{lam_varies}{at_bound}, "
         f"{_spread([report.df for report in reports])} degrees of freedom, noise {noise}{'°' if degrees else ''}"
+        f"{_on_ground([float(np.max(report.sigma)) for report in reports]) if earth else ''}"
         f"{noise_varies}{advice}{gain}"
     )
 

@@ -128,13 +128,14 @@ def set_level(level: int) -> None:
 
 def tell(message: object, level: int = USUAL) -> None:
     """Print a description of the work on stderr, if the level is reached."""
-    if level <= _level:
+    if level <= _level and sys.stderr is not None:
         print(brief(message, _LONGEST), file=sys.stderr)
 
 
 def say(message: object) -> None:
     """Print one line on stderr."""
-    print("symspline:", brief(message, _LONGEST), file=sys.stderr)
+    if sys.stderr is not None:
+        print("symspline:", brief(message, _LONGEST), file=sys.stderr)
 
 
 @contextmanager
@@ -234,6 +235,9 @@ def _in_utf8(file: BinaryIO) -> BinaryIO:
 
 @cache
 def _standard_input() -> bytes:
+    # Python has no stream for a descriptor that is closed.
+    if sys.stdin is None:
+        raise Problem("standard input is closed; give the name of a file")
     return sys.stdin.buffer.read()
 
 
@@ -256,6 +260,8 @@ def called(output: Path) -> str:
 def check_target(path: Path, *inputs: Path | None, binary: bool = False) -> None:
     """Raise `Problem` before any work is done if the output file cannot be written, or is an input."""
     if path == STANDARD:
+        if sys.stdout is None:
+            raise Problem("standard output is closed; give the name of a file")
         refuse(
             "standard output ",
             (not hasattr(sys.stdout, "buffer"), "does not take bytes here; give the name of a file"),

@@ -789,7 +789,7 @@ def _read_parquet(path: Source) -> Table:
     with path.open() as file:
         try:
             frame = pd.read_parquet(file)
-        except ArrowInvalid:
+        except (ArrowInvalid, OSError):
             raise Problem(f"{path} is damaged or not a Parquet file") from None
     zones = {name: getattr(frame[name].dtype, "tz", None) is not None for name in frame}
     columns: dict[str, Array] = {}
