@@ -111,7 +111,7 @@ def test_the_short_help_is_one_screen(capsys, verb, monkeypatch):
 def test_help_and_version(capsys, fails):
     assert main(["help"]) == 0
     assert capsys.readouterr().out.startswith("usage: symspline")
-    assert "did you mean sample?" in fails("help sampel")
+    assert "did you mean sample?" in fails("help sampl")
     with pytest.raises(SystemExit):
         main(["-V"])
     assert capsys.readouterr().out.startswith("symspline ")
