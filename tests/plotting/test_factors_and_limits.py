@@ -56,6 +56,17 @@ def test_limits_of_time_laws():
     assert "limit" not in texts_of(figure)
 
 
+def test_velocities_of_a_fast_law_are_not_clipped():
+    """The knots of the law are close together, so that rounding errors of points could explain large velocities."""
+    corners = np.array([[0, -1, 0.5], [0.8, -0.6, 0.9], [1.5, 0, 0.2], [1.0, 0.7, -0.6], [0, 0.2, 0.3]])
+    path = ss.CubicSpline(None, [corners[:, [j]] for j in range(3)], "r:1 x r:1 x r:1")
+    moved = path.retime(ss.time_law(path, max_speed=(2.0,) * 3, max_acceleration=(5.0, 5.0, 6.0)))
+    for axes in rate_axes(rendered(moved.plot()))[0]:
+        low, high = axes.get_ylim()
+        for line in axes.lines:
+            assert low < np.min(line.get_ydata()) and np.max(line.get_ydata()) < high
+
+
 def test_noise_on_the_earth_is_in_metres():
     rng = np.random.default_rng(0)
     lon, lat = np.linspace(5, 6, 40), 52 + 1e-3 * rng.normal(size=40)
