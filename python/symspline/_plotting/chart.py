@@ -60,7 +60,7 @@ _STEMS = 25
 _STEPS = np.multiply.outer(10.0 ** np.arange(-9, 3), [1, 2, 5]).ravel()
 _LONG = 2.0
 """Curves are in a view that is wide or narrow if one side is longer than the other by this factor."""
-_FILLED, _ZOOM, _AROUND = 0.76, 1.4, (0.35, 0.04)
+_FILLED, _ZOOM, _AROUND = 0.76, 1.4, (0.4, 0.05)
 """The part of axes that a box fills, if it is enlarged by no more than this factor, and the smallest space around it in
 inches, with a part per point of the size of labels."""
 
