@@ -227,3 +227,17 @@ def test_only_density_matrices_get_the_advice_for_them(name, matrices, hint):
     with pytest.raises(ss.ValidationError) as caught:
         ss.CubicSpline(None, matrices, name)
     assert ("looks like density matrices, Hermitian of trace 1" in str(caught.value)) == hint
+
+
+def test_covariances_of_low_rank_name_the_remedy():
+    x = np.random.default_rng(0).standard_normal((6, 4, 200))
+    x -= x.mean(axis=1, keepdims=True)  # the average reference of electroencephalography
+    raises(
+        r"its rank is too low\. Drop a variable, or add a small multiple", ss.space("spd:4").mean, x @ x.swapaxes(1, 2)
+    )
+    # Both remedies.
+    assert ss.space("spd:3").mean(x[:, :3] @ x[:, :3].swapaxes(1, 2)).shape == (3, 3)
+    assert ss.space("spd:4").mean(x @ x.swapaxes(1, 2) + 1e-3 * np.eye(4)).shape == (4, 4)
+    with pytest.raises(ss.ValidationError, match="smallest eigenvalue") as caught:
+        ss.CubicSpline(None, [np.eye(2), np.diag([1.0, -0.5])], "spd:2")
+    assert "rank" not in str(caught.value)

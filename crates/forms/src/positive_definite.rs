@@ -308,8 +308,16 @@ impl<const D: usize, A: Storage> Ambient for PositiveDefinite<D, A> {
         }
         let mut values = [p.clone()];
         diagonalize(&mut values);
-        let least = (0..self.n).map(|i| values[0][(i, i)][0].to_array()[0]).fold(f64::INFINITY, f64::min);
-        let rounding = if least > 0.0 { ", which is rounding beside the others" } else { "" };
+        let eigenvalues = || (0..self.n).map(|i| values[0][(i, i)][0].to_array()[0]);
+        let (least, largest) =
+            (eigenvalues().fold(f64::INFINITY, f64::min), eigenvalues().fold(0.0, f64::max));
+        // Covariances of fewer samples than variables, or after an average reference.
+        let rounding = if least > -1e-10 * largest {
+            ", which is rounding beside the others: its rank is too low. Drop a variable, or add a small multiple of the \
+             identity"
+        } else {
+            ""
+        };
         if self.special && positive_definite(&p).all() && off < 1e-8 {
             let det = self.log_det(&p).to_array()[0].exp();
             format!("its determinant is {det:.9e}, not 1 (SymmetricPositiveDefinite({}) takes it)", self.n)
