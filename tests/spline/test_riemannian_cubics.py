@@ -1,5 +1,6 @@
 """Riemannian cubics through the points of splines."""
 
+import warnings
 from contextlib import nullcontext
 from itertools import pairwise
 
@@ -12,6 +13,7 @@ from scipy.optimize import root
 
 import symspline as ss
 
+SPHERE = ss.Sphere(2)
 SPACES = ["sphere:2", "hyperbolic:2", "so:3", "cp:2", "gr:2,5", "spd:3", "su:2"]
 each_space = pytest.mark.parametrize("name", SPACES)
 T = np.array([0.0, 0.7, 1.9, 2.6, 3.4])
@@ -382,3 +384,36 @@ POINTS = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.6, 0.8]]
 def test_invalid_arguments_raise(make, options, message):
     with pytest.raises(ss.ValidationError, match=message):
         ss.riemannian_cubic(make(), **options)
+
+
+def test_a_curve_of_larger_energy_than_the_spline_has_a_warning():
+    """A long gap beside short steps: Newton's method ends in another local minimum."""
+    worse = 0
+    for seed in range(60):
+        rng = np.random.default_rng(seed)
+        t = np.cumsum(rng.exponential(1, 20) + 0.05)
+        t[10:] += 30
+        points = [SPHERE.random_point(rng)]
+        for _ in t[1:]:
+            v = SPHERE.random_tangent(rng, points[-1])
+            points.append(SPHERE.exp(points[-1], 0.3 * v / np.linalg.norm(v)))
+        spline = ss.CubicSpline(t, points, SPHERE, on_failure="ignore")
+        if not spline.report.converged:
+            continue
+        try:
+            with warnings.catch_warnings(record=True) as caught:
+                warnings.simplefilter("always")
+                found = ss.riemannian_cubic(spline)
+        except ss.ConvergenceError as error:
+            assert "Put points between" in str(error)
+            continue
+        if found.energy > spline.bending_energy() * (1 + 1e-6):
+            worse += 1
+            assert any(issubclass(one.category, ss.ConvergenceWarning) for one in caught)
+    assert worse > 0
+
+
+def test_an_empty_batch_is_an_error():
+    empty = ss.CubicSpline(None, np.zeros((0, 5, 3)), SPHERE)
+    with pytest.raises(ss.ValidationError, match="empty batch"):
+        ss.riemannian_cubic(empty)

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from .._base.typing import Array
-from .._core import CurvatureTensor
+from .._core import ConvergenceError, CurvatureTensor
 from .._spaces import AnySpace, Doubles
 
 # Largest K|γ'| times the length of a step of the integration.
@@ -82,6 +82,12 @@ def solve(start: Start, steps: int, outputs: int, tol: float, max_iter: int) -> 
     problem = _Problem(start, steps)
     state = problem.state()
     shot = problem.shoot(state)
+    if (lost := ~np.isfinite(shot.merit)).any():
+        which = f" of curve {int(np.argmax(lost))}" if lost.size > 1 else ""
+        raise ConvergenceError(
+            f"the equation of Riemannian cubics, followed from the velocities and accelerations of the spline{which}, "
+            "does not lead to the next points. Put points between those that are far apart."
+        )
     converged = minimum = np.zeros(len(start.h), bool)
     iterations = 0
     while iterations < max_iter and not converged.all():

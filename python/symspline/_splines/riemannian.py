@@ -23,6 +23,8 @@ from .cubic import CubicSpline
 
 # Largest dimension of a factor: the curvature tensor has the fourth power of it as its number of entries.
 _MOST = 48
+# Relative errors of the energy of a spline, which is computed by quadrature.
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +50,7 @@ class RiemannianCubic(Generic[P]):
 
     See Also
     --------
-    riemannian_cubic : Compute Riemannian riemannian.
+    riemannian_cubic : Compute Riemannian cubics.
 
     Examples
     --------
@@ -97,14 +99,17 @@ def riemannian_cubic(
     Raises
     ------
     ValidationError
-        If `spline` is not a `CubicSpline`, did not converge, has other end conditions, or has velocities that are
-        prescribed at inner points. Also if the space does not have an invariant Riemannian metric or its dimension
-        exceeds 48.
+        If `spline` is not a `CubicSpline`, has no curves, did not converge, has other end conditions, or has velocities
+        that are prescribed at inner points. Also if the space does not have an invariant Riemannian metric or its
+        dimension exceeds 48.
+    ConvergenceError
+        If points are so far apart that Newton's method cannot start from the spline.
 
     Warns
     -----
     ConvergenceWarning
-        If Newton's method does not converge, or converges to a curve that is not a local minimum.
+        If Newton's method does not converge, or converges to a curve that is not a local minimum, or that has a larger
+        bending energy than the spline.
 
     See Also
     --------
@@ -187,7 +192,8 @@ def riemannian_cubic(
     converged = np.all([found.converged for found in solutions], axis=0).reshape(batch)
     minimum = np.all([found.minimum for found in solutions], axis=0).reshape(batch)
     energy = np.sum([found.energy for found in solutions], axis=0).reshape(batch)
-    _warn(converged, minimum)
+    higher = energy > (1 + _ROUNDING) * np.asarray(spline.bending_energy())
+    _warn(converged, minimum, higher)
     return RiemannianCubic(
         result,
         energy[()],
@@ -198,10 +204,14 @@ def riemannian_cubic(
     )
 
 
-def _warn(converged: Any, minimum: Any) -> None:
+def _warn(converged: Any, minimum: Any, higher: Any) -> None:
     for failed, problem in (
         (~converged, "Newton's method did not converge to a Riemannian cubic"),
         (converged & ~minimum, "the bending energy has no local minimum at the Riemannian cubic that was found"),
+        (
+            converged & minimum & higher,
+            "the Riemannian cubic that was found has a larger bending energy than the spline",
+        ),
     ):
         if failed.any():
             which = f" for {np.sum(failed)} of {failed.size} curves" if failed.ndim else ""
@@ -218,6 +228,8 @@ def _checked_ends(spline: Any) -> tuple[tuple[bool, bool], bool]:
     """
     if not isinstance(spline, CubicSpline):
         raise ValidationError(f"spline must be a CubicSpline, not {short_repr(spline)}")
+    if 0 in spline._batch:
+        raise ValidationError(f"spline is an empty batch of shape {spline._batch}. Pass at least one curve.")
     for factor in factors_of(spline.space):
         if isinstance(factor, Manifold) or not np.isfinite(factor.curvature):
             raise ValidationError(
